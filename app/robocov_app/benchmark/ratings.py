@@ -485,7 +485,8 @@ def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[
 
     Returns
     -------
-    head : tuple of str
+    header : tuple of str
+        Column titles.
     rows : list of tuple of str
         One row for each rating.
     """
@@ -502,7 +503,7 @@ def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[
     return ("Controller", *families), table
 
 
-def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def build_summary_table(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Build a short table of one result, with one row for each track.
 
     Parameters
@@ -512,7 +513,8 @@ def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list
 
     Returns
     -------
-    head : tuple of str
+    header : tuple of str
+        Column titles.
     rows : list of tuple of str
         One row for each track.
     """
@@ -524,9 +526,9 @@ def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list
 
 
 def _drop_empty_columns(
-    head: tuple[str, ...], rows: Sequence[tuple[str, ...]]
+    header: tuple[str, ...], rows: Sequence[tuple[str, ...]]
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return a table without the columns that have no value in any row."""
-    columns = [k for k in range(len(head)) if any(row[k] != NO_VALUE for row in rows)]
-    short_head = tuple(head[k] for k in columns)
-    return short_head, [tuple(row[k] for k in columns) for row in rows]
+    columns = [k for k in range(len(header)) if any(row[k] != NO_VALUE for row in rows)]
+    short_header = tuple(header[k] for k in columns)
+    return short_header, [tuple(row[k] for k in columns) for row in rows]

@@ -177,9 +177,9 @@ def _run(options: Arguments) -> int:
 
 def _print_ratings(result: dict[str, Any], folder: Path) -> None:
     """Print the table of the ratings on each track, and explain its columns."""
-    from robocov_app.benchmark.ratings import build_summary_rows
+    from robocov_app.benchmark.ratings import build_summary_table
 
-    (first_title, *titles), rows = build_summary_rows(result)
+    (first_title, *titles), rows = build_summary_table(result)
     columns = [(first_title, BOLD)]
     columns += [(title, RIGHT) for title in titles]
     print_table(columns, rows)

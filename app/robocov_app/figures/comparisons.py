@@ -180,7 +180,7 @@ def _draw_page(
         run_drawing.draw_run(axes, record, theme, contents.colors, contacts=points)
         all_axes.append(axes)
     _write_captions(page, captions, panels, grid)
-    drawn_handles = run_drawing.select_drawn(handles, all_axes)
+    drawn_handles = run_drawing.drop_undrawn_handles(handles, all_axes)
     boxes = [panel.box for panel in panels]
     if captions.fit_in_one_line(grid.caption_width):
         boxes = [panel.box._replace(width=max(panel.box.width, panel.caption_width)) for panel in panels]

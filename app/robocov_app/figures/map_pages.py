@@ -127,7 +127,7 @@ def plot_trajectories(
         handles = run_drawing.build_run_handles(record, theme, colors, contacts=contacts)
         map_page = _create_map_page(record.environment, theme, size, handles, title=title, facts=facts)
         run_drawing.draw_run(map_page.axes, record, theme, colors, contacts=contacts)
-        map_page.draw_footer(run_drawing.select_drawn(handles, [map_page.axes]))
+        map_page.draw_footer(run_drawing.drop_undrawn_handles(handles, [map_page.axes]))
         return map_page.page.figure
     map_drawing.set_meter_axes(axes, record.environment, theme)
     run_drawing.draw_run(axes, record, theme, colors, contacts=contacts)

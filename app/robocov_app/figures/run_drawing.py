@@ -494,7 +494,7 @@ def _build_contact_style(theme: Theme) -> dict[str, Any]:
 def build_run_handles(
     record: Record, theme: Theme, colors: ColorScheme, *, contacts: FloatArray | None = None
 ) -> list[Artist]:
-    """Build the legend entries for what `draw_run` may draw; see `select_drawn`."""
+    """Build the legend entries for what `draw_run` may draw; see `drop_undrawn_handles`."""
     start_color = theme.start
     trail_color = theme.trajectory
     final_color = theme.final
@@ -522,14 +522,14 @@ def build_run_handles(
     return [*handles, *build_map_handles(record.environment, theme, show_boundary=False)]
 
 
-def select_drawn(handles: Iterable[Artist], axes: Iterable[Axes]) -> list[Artist]:
-    """Return legend entries without those of goals, contacts and cells that none of the axes contain.
+def drop_undrawn_handles(handles: Iterable[Artist], panels: Iterable[Axes]) -> list[Artist]:
+    """Drop the handles of goals, contacts and cells that no panel contains.
 
     Goals are not drawn where robots have reached them, and a single cell has no visible edge.
     """
     drawn_labels: set[str] = set()
-    for item in axes:
-        _, labels = item.get_legend_handles_labels()
+    for panel in panels:
+        _, labels = panel.get_legend_handles_labels()
         drawn_labels.update(labels)
     return [
         handle

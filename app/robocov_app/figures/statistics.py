@@ -62,14 +62,14 @@ class Interval:
         -------
         float
             For a fraction, from binomial tests; otherwise the fraction of resamples that are outside the
-            bounds. 1 if there is no interval.
+            bounds, to which one outside is added. 1 if there is no interval.
         """
         if self.trials:
             return self._compute_binomial_p_value(low, high)
         if self.resampled_values is None:
             return 1.0
         is_outside = ~((low <= self.resampled_values) & (self.resampled_values <= high))
-        # The estimate counts as one more resample, so that a p-value is never 0.
+        # One resample outside the bounds is added, so that a p-value is never 0.
         return float(1 + np.count_nonzero(is_outside)) / (1 + self.resampled_values.size)
 
     def _compute_binomial_p_value(self, low: float, high: float) -> float:

@@ -133,5 +133,5 @@ def test_all_columns_of_the_printed_ratings_are_explained(capsys: pytest.Capture
     printed = capsys.readouterr().out
     for explanation in _EXPLANATIONS.values():
         assert explanation in printed
-    (_, *titles), _ = ratings.build_summary_rows(result)
+    (_, *titles), _ = ratings.build_summary_table(result)
     assert set(titles) == {"Runs", *_EXPLANATIONS}

@@ -291,8 +291,8 @@ class TestStarts:
             # The final positions of each kind of start are shifted upwards from those of the previous one.
             offsets = (shift * start_indices)[:, None, None] * [0.0, 1.0]
             values[key, "placement"] = row + offsets + 0.01 * rng.random((len(start_indices), 6, 2))
-        share_sides = dict.fromkeys(outcomes.maps, 4.0)
-        claim = judge_starts_placement(Outcomes(outcomes.instances, values, share_sides))
+        length_scale_by_map = dict.fromkeys(outcomes.maps, 4.0)
+        claim = judge_starts_placement(Outcomes(outcomes.instances, values, length_scale_by_map))
         assert claim.verdict == verdict
         assert claim.criteria[0].interval.estimate == pytest.approx(rapf_shift / 4.0, rel=0.1)
 

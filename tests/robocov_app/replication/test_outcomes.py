@@ -79,7 +79,9 @@ def test_every_value_is_that_of_its_run(study, folder):
         assert outcomes.get_values(key, "first_minute")[k] == pytest.approx(mean, rel=1e-9)
     assert (outcomes.get_values("rapf-best", "final") == outcomes.get_values("rapf-shared", "final")).all()
     assert np.isnan(outcomes.get_values("rapf-default", "final")).all()
-    assert outcomes.share_sides["blocks-a"] == pytest.approx(np.sqrt(load_map("blocks-a").free_area / 6))
+    assert outcomes.length_scale_by_map["blocks-a"] == pytest.approx(
+        np.sqrt(load_map("blocks-a").free_area / 6)
+    )
 
 
 def test_values_of_failed_runs_are_nan(study, folder, tmp_path):

@@ -370,7 +370,7 @@ def describe_controller(
 
 
 def read_description(values: Any) -> Description:
-    """Return the description in plain values.
+    """Parse and check the description that a controller process has sent.
 
     Parameters
     ----------

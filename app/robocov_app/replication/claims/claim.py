@@ -285,7 +285,7 @@ def judge_pairs(
     if pairs is None:
         return claim
     criteria = (
-        Criterion(ratio_measure, pairs.ratio, high=max_ratio),
+        Criterion(ratio_measure, pairs.median_ratio, high=max_ratio),
         Criterion(wins_measure, pairs.wins, low=min_wins, unit="%"),
     )
     return claim.judge(criteria, explain(pairs), pairs.outcomes, runs_per_instance=2)

@@ -28,7 +28,7 @@ def judge_convex_final(outcomes: Outcomes, gains: GainChoice = "shared") -> Clai
     criteria = (
         Criterion(
             "median of J(RAPF) / J(Lloyd) at the end",
-            pairs.ratio,
+            pairs.median_ratio,
             low=1.0 - SAME_COST,
             high=1.0 + SAME_COST,
         ),

@@ -32,7 +32,9 @@ def judge_targets(outcomes: Outcomes) -> Claim:
     wins = []
     for comparison in pairs:
         measure = f"median of J({comparison.first}) / J(centroid) at the end"
-        criteria.append(Criterion(measure, comparison.ratio, low=1.0 - SAME_COST, high=1.0 + SAME_COST))
+        criteria.append(
+            Criterion(measure, comparison.median_ratio, low=1.0 - SAME_COST, high=1.0 + SAME_COST)
+        )
         fraction = format_amount(comparison.wins.estimate, "%")
         wins.append(f"{comparison.first} lower in {fraction} of the runs")
     explanation = f"{capitalize('; '.join(wins))}."

@@ -327,7 +327,7 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
         pairs = outcomes.compare(own.key, other.key)
         if pairs is not None:
             measure = f"median of J({own.label}) / J({other.label}) at the end"
-            criteria.append(Criterion(measure, pairs.ratio, high=1.0))
+            criteria.append(Criterion(measure, pairs.median_ratio, high=1.0))
     medians = finished.compute_medians_by_map(own.key)
     worst = max(medians, key=medians.__getitem__)
     explanation = (

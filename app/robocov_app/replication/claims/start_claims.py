@@ -59,7 +59,7 @@ def judge_starts_placement(outcomes: Outcomes, gains: GainChoice = "shared") -> 
         return claim
     rapf = np.array([rapf_spreads[name] for name in maps])
     rpf = np.array([rpf_spreads[name] for name in maps])
-    sides = [finished.share_sides[name] for name in maps]
+    sides = [finished.length_scale_by_map[name] for name in maps]
     measure = (
         "distance between matched final positions from different starts, "
         "relative to the side of a square with the mean free area per robot"

@@ -44,7 +44,7 @@ class RunnerOptions:
     quiet : bool
         Whether to show no progress.
     stop : Interruption
-        Tells whether the user has interrupted the study.
+        Whether the user has interrupted the study.
     keep_versions : bool
         Whether to keep runs of other versions of robocov and its dependencies.
     """

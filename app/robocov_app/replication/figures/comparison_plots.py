@@ -46,7 +46,7 @@ class PairsRow(NamedTuple):
     """A row of a plot of pairs."""
 
     text: str
-    pairs: PairedComparison | None
+    comparison: PairedComparison | None
     controller: str
     """Controller that determines the style of the row."""
 
@@ -83,9 +83,14 @@ def prepare_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Dr
     theme : Theme
     """
     pairs = [
-        Pairs(row.text, get_style(row.controller), row.pairs.ratios, row.pairs.ratio)
+        Pairs(
+            label=row.text,
+            style=get_style(row.controller),
+            ratios=row.comparison.ratios,
+            interval=row.comparison.median_ratio,
+        )
         for row in rows
-        if row.pairs is not None
+        if row.comparison is not None
     ]
     return partial(_draw_pairs, pairs, label, theme) if pairs else None
 

@@ -279,7 +279,7 @@ def draw_side_by_side(records: Sequence[Record], headings: Iterable[tuple[str, s
         top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
         page.write(f"({letter})  {title}", left, top, points=TITLE_SIZE_PT, bold=True)
         page.write(cost, right, top, points=SMALL_SIZE_PT, color=theme.faint, align="right")
-    draw_panel_footer(page, boxes, environment, run_drawing.select_drawn(handles, panels))
+    draw_panel_footer(page, boxes, environment, run_drawing.drop_undrawn_handles(handles, panels))
     return page.figure
 
 

@@ -82,12 +82,11 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         for key in matching_keys:
             for measure, value in measured.items():
                 values[key, measure][instance_index] = value
-    # Distances on a map are judged relative to the side of a square with the free area per robot.
-    share_sides = {}
+    length_scale_by_map = {}
     for study_map in contest.study.maps:
         area_per_robot = study_map.environment.free_area / ROBOTS
-        share_sides[study_map.name] = float(np.sqrt(area_per_robot))
-    return Outcomes(instances, values, share_sides)
+        length_scale_by_map[study_map.name] = float(np.sqrt(area_per_robot))
+    return Outcomes(instances, values, length_scale_by_map)
 
 
 def _measure_run(row: Mapping[str, Any], results: Results, references: References) -> dict[str, Any]:

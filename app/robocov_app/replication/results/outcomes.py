@@ -46,13 +46,13 @@ class Outcomes:
     instances : tuple of ProblemInstance
     values : Mapping
         Arrays by contender and measure; nan where a run failed.
-    share_sides : Mapping
-        Side of the square whose area is the share of one robot, m, by map.
+    length_scale_by_map : Mapping
+        Side of a square with the mean free area per robot, m, by map; distances are judged relative to it.
     """
 
     instances: tuple[ProblemInstance, ...]
     values: Mapping[tuple[str, str], FloatArray]
-    share_sides: Mapping[str, float] = field(default_factory=dict)
+    length_scale_by_map: Mapping[str, float] = field(default_factory=dict)
 
     def get_values(self, contender: str, measure: str) -> FloatArray:
         """Return the values of a measure for a contender, (m,); all nan if it did not take part."""
@@ -73,7 +73,7 @@ class Outcomes:
         """Return the outcomes on the instances where a mask, (m,), is true."""
         rows = np.array(mask, dtype=bool)
         values = {key: array[rows] for key, array in self.values.items()}
-        return Outcomes(tuple(compress(self.instances, mask)), values, self.share_sides)
+        return Outcomes(tuple(compress(self.instances, mask)), values, self.length_scale_by_map)
 
     def select_finite(self, measure: str, *contenders: str) -> Outcomes:
         """Return the outcomes on the instances on which a measure is finite for all given contenders."""
@@ -108,7 +108,10 @@ class Outcomes:
             if np.isfinite(positions).all() and np.isfinite(other_positions).all():
                 distance = compute_matched_distance(positions, other_positions)
                 distances.setdefault(instance.map, []).append(distance)
-        return {name: float(np.median(values)) / self.share_sides[name] for name, values in distances.items()}
+        return {
+            name: float(np.median(values)) / self.length_scale_by_map[name]
+            for name, values in distances.items()
+        }
 
     def compare(self, first: str, second: str, measure: str = "final") -> PairedComparison | None:
         """Compare two contenders; None if they have no instance in common."""
@@ -144,8 +147,8 @@ class PairedComparison:
         return self.first_values / self.second_values
 
     @cached_property
-    def ratio(self) -> Interval:
-        """Median ratio."""
+    def median_ratio(self) -> Interval:
+        """Median ratio, with its interval."""
         return bootstrap(self.ratios, clusters=self.outcomes.maps)
 
     @cached_property
@@ -172,15 +175,15 @@ def merge_outcomes(parts: Sequence[Outcomes]) -> Outcomes:
     instances = tuple(dict.fromkeys(instance for part in parts for instance in part.instances))
     index = {instance: k for k, instance in enumerate(instances)}
     values: dict[tuple[str, str], FloatArray] = {}
-    share_sides: dict[str, float] = {}
+    length_scale_by_map: dict[str, float] = {}
     for part in parts:
         rows = [index[instance] for instance in part.instances]
         for key, array in part.values.items():
             if key not in values:
                 values[key] = np.full((len(instances), *array.shape[1:]), np.nan)
             values[key][rows] = array
-        share_sides |= part.share_sides
-    return Outcomes(instances, values, share_sides)
+        length_scale_by_map |= part.length_scale_by_map
+    return Outcomes(instances, values, length_scale_by_map)
 
 
 @dataclass(frozen=True, eq=False)
