@@ -14,6 +14,9 @@ from robocov_app.jobs.messages import READY, Progress, Reply, receive, send
 _PIPE_BYTES = 1 << 20
 """Capacity of the pipe for answers. If a whole answer fits, its reader wakes up less often."""
 
+_REQUEST_NUMBER = 0
+"""Number of every request. The caller waits for each answer, so one number is enough."""
+
 
 def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
     """Start the process of a service.
@@ -101,7 +104,7 @@ def ask_process(process: subprocess.Popen[bytes], request: object) -> Reply | No
     assert process.stdin is not None
     assert process.stdout is not None
     with suppress(OSError):
-        send(process.stdin, (0, request))
+        send(process.stdin, (_REQUEST_NUMBER, request))
     reply = receive(process.stdout)
     while reply == READY or isinstance(reply, Progress):
         reply = receive(process.stdout)

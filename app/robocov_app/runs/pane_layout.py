@@ -198,11 +198,10 @@ def _draw_legend(
     )
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
-    entries = [painter.list_legend_entries(scene) for scene in scenes]
+    legends = [painter.list_legend_entries(scene) for scene in scenes]
     # The longest legend comes first and determines the order, because it usually contains all entries.
-    entries.sort(key=len)
-    entries.reverse()
-    merged = merge_legends(entries, lambda entry: entry.key)
+    legends.sort(key=len, reverse=True)
+    merged = merge_legends(legends, lambda entry: entry.key)
     return render_legend_image(merged, width, settings.color_theme, scale, settings.shown_layers)
 
 

@@ -284,9 +284,6 @@ class EditorWindow(CommandWindow):
         if not (self.pointer.is_busy and editor.measurement_worker.is_busy):
             editor.request_measurement()
         self._show_draft_problem()
-        if self.file_commands.may_close:
-            self.closed = True
-            return
         self._arrange()
         for part in self.parts:
             part.is_covered = self.dialogs.is_open

@@ -59,7 +59,7 @@ class _RingParser:
         self.shapes = Shapes(file.source_name, options)
 
     def parse_polygons(self) -> list[list[FloatArray]]:
-        """Return the polygons in the file, in its units. The nesting of the lists tells the structure."""
+        """Return the polygons in the file, in its units. The nesting depth determines the structure."""
         document = self.file.document
         if isinstance(document, dict):
             return [self._parse_flat_polygon(document)]

@@ -45,7 +45,7 @@ def save_branch(
     settings : OutputSettings
         Which files to write, and how.
     interruption : Interruption
-        Tells whether the user has asked to stop.
+        Whether the user has requested to stop.
 
     Returns
     -------

@@ -15,7 +15,7 @@ _MIN_SINE = 0.1
 """Two walls are parallel if the sine of the angle between them is smaller."""
 
 
-def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
+def sharpen_corners(polygon: Polygon, tolerance: float) -> Polygon:
     """Restore the cut corners of a polygon.
 
     A run of short sides is replaced by the point where the long sides before and after it meet, if the whole
@@ -23,18 +23,18 @@ def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
 
     Parameters
     ----------
-    plan : Polygon, m
+    polygon : Polygon, m
     tolerance : float, m
 
     Returns
     -------
     Polygon, m
-        The sharpened polygon, or `plan` itself if the result would be invalid.
+        The sharpened polygon, or `polygon` itself if the result would be invalid.
     """
-    lines = (plan.exterior, *plan.interiors)
+    lines = (polygon.exterior, *polygon.interiors)
     rings = [_sharpen_ring(np.asarray(line.coords)[:-1], tolerance) for line in lines]
-    sharp = Polygon(rings[0], rings[1:])
-    return sharp if sharp.is_valid else plan
+    sharpened = Polygon(rings[0], rings[1:])
+    return sharpened if sharpened.is_valid else polygon
 
 
 def _sharpen_ring(ring: FloatArray, tolerance: float) -> FloatArray:

@@ -72,14 +72,14 @@ class SimplificationCheck:
         return np.asarray(order[np.where(index < simplified.starts[ring], last[ring], index)])
 
     def find_area_and_distance_errors(self) -> tuple[BoolArray, BoolArray]:
-        """Find rings whose area has changed too much, and vertices too far from the simplified outline.
+        """Find vertices of rings whose area has changed too much, and vertices too far from the outline.
 
         Returns
         -------
         has_wrong_area : (k,) array of bool
             Vertices of rings whose area has changed too much.
         is_too_far : (k,) array of bool
-            For each side, the farthest of the vertices that it represents, if it is beyond the tolerance.
+            Vertices beyond the tolerance. Of those that one side represents, only the farthest is marked.
         """
         allowed = self.allowed
         is_too_far = self._find_distant_vertices()
