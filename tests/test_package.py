@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 DESCRIPTION = (ROOT / PROJECT["readme"]).read_text(encoding="utf-8")
 EXTRAS = PROJECT["optional-dependencies"]
-EXTRAS_FOR_DEVELOPERS = {"all", "test", "bench"}
+EXTRAS_FOR_DEVELOPERS = {"all", "test", "bench", "coverage-control"}
 MAX_ARCHIVE_BYTES = 6_000_000
 MAX_ARCHIVED_FILE_BYTES = 250_000
 MAX_WHEEL_BYTES = 6_500_000

@@ -1,4 +1,4 @@
-"""Coverage of an unknown density in the default setting of CoverageControl, beside its own controllers.
+"""Coverage of an unknown density in the default setting of CoverageControl, next to its own controllers.
 
     python tests/bench/bench_coverage_control.py --worlds 4
 
@@ -7,9 +7,10 @@ square of 1024 m without walls, and the density has 32 peaks. Robots move at up 
 within 128 m, and sense the density in a square of 64 m around them; in robocov, they sense it in a disc with
 this diameter. The cost is the sum of the squared distances to the nearest robot, weighted by the density.
 
-The table contains the fraction of the initial cost that is left in the end. Both simulators run on the same
-worlds, from the same starts. The controllers of CoverageControl are run by its own library, which has to be
-installed: ``pip install coverage_control``.
+The table, which the handbook shows on the page on controllers, contains the remaining cost: the final cost
+divided by the initial one. Both simulators run on the same worlds, from the same starts. The controllers of
+CoverageControl are run by its own library, which has to be installed:
+``pip install "robocov[coverage-control]"``.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import argparse
 import importlib.util
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -54,14 +55,16 @@ THEIR_CONTROLLERS = {
 }
 """Controllers of CoverageControl, with what a robot knows."""
 OUR_CONTROLLERS = {
-    "exploring-lloyd": "what robots have sensed and told each other",
-    "gp-ucb": "the density where robots have been, and measurements of others",
-    "adaptive": "the same, but senses only at its position",
-    "atlas-shared": "the density, and positions that robots told each other",
+    "exploring-lloyd": "what robots have sensed and sent each other",
     "rapf": "the density, and positions within range",
     "lloyd": "the density, and positions within range",
+    "gp-ucb": "the density where robots have been, and measurements of others",
+    "adaptive": "the density where robots have been, and estimates of others",
 }
-"""Controllers of robocov, with what a robot knows."""
+"""Controllers of robocov that run by default, with what a robot knows."""
+CLAIRVOYANT_LLOYD = "the density and all positions"
+"""What a robot of Lloyd's algorithm knows with unlimited communication."""
+HEAD = "| controller | what a robot knows | remaining cost | in each world |\n|---|---|---|---|"
 
 
 class Peak(NamedTuple):
@@ -181,17 +184,46 @@ def load_coverage_control() -> Any:
     if "coverage_control" not in sys.modules:
         spec = importlib.util.find_spec("coverage_control")
         if spec is None or spec.submodule_search_locations is None:
-            raise SystemExit("CoverageControl is missing: pip install coverage_control, or use --ours")
+            raise SystemExit(
+                'CoverageControl is missing: pip install "robocov[coverage-control]", or use --ours'
+            )
         package = ModuleType("coverage_control")
         package.__path__ = [str(Path(folder)) for folder in spec.submodule_search_locations]
         sys.modules["coverage_control"] = package
     return importlib.import_module("coverage_control._core")
 
 
-def print_row(name: str, knowledge: str, fractions: Sequence[float]) -> None:
-    """Print a row of the table, as Markdown."""
-    each = ", ".join(f"{fraction:.2f}" for fraction in fractions)
-    print(f"| {name} | {knowledge} | {np.mean(fractions):.2f} | {each} |", flush=True)
+class Row(NamedTuple):
+    """A row of the table."""
+
+    label: str
+    knowledge: str
+    """What a robot knows."""
+    fractions: Sequence[float]
+    """Remaining cost in each world."""
+
+    @property
+    def mean(self) -> float:
+        """Mean over the worlds, rounded as in the table."""
+        return round(float(np.mean(self.fractions)), 2)
+
+
+def format_row(row: Row) -> str:
+    """Format a row of the table as Markdown."""
+    each = ", ".join(f"{fraction:.2f}" for fraction in row.fractions)
+    return f"| {row.label} | {row.knowledge} | {row.mean:.2f} | {each} |"
+
+
+def format_table(rows: Sequence[Row]) -> str:
+    """Format the table as Markdown. Rows are in the order of their means; equal means keep their order."""
+    return "\n".join([HEAD, *(format_row(row) for row in sorted(rows, key=lambda row: row.mean))])
+
+
+def list_labels() -> dict[str, str]:
+    """Return what a robot knows, by the label of each row of the table with the default options."""
+    labels = {f"{name} (CoverageControl)": knowledge for name, knowledge in THEIR_CONTROLLERS.items()}
+    labels["`lloyd` with unlimited communication"] = CLAIRVOYANT_LLOYD
+    return labels | {f"`{name}`": knowledge for name, knowledge in OUR_CONTROLLERS.items()}
 
 
 def main() -> None:
@@ -203,19 +235,24 @@ def main() -> None:
     parser.add_argument("--ours", action="store_true", help="leave out the controllers of CoverageControl")
     parser.add_argument("--workers", type=int, default=2, help="number of processes")
     arguments = parser.parse_args()
-    seeds = range(arguments.worlds)
-    print("| controller | what a robot knows | mean | in each world |\n|---|---|---|---|")
+    limited = partial(run_ours, duration=arguments.duration, communication_range=COMMUNICATION_RANGE_M)
+    runs: dict[str, Callable[[int], float]] = {}
+    if not arguments.ours:
+        for name in THEIR_CONTROLLERS:
+            runs[f"{name} (CoverageControl)"] = partial(run_theirs, name, duration=arguments.duration)
+    runs["`lloyd` with unlimited communication"] = partial(
+        run_ours, "lloyd", duration=arguments.duration, communication_range=math.inf
+    )
+    for name in arguments.controllers:
+        runs[f"`{name}`"] = partial(limited, name)
+    knowledge = list_labels()
+    rows = []
     with ProcessPoolExecutor(arguments.workers) as pool:
-        if not arguments.ours:
-            for name, knowledge in THEIR_CONTROLLERS.items():
-                run = partial(run_theirs, name, duration=arguments.duration)
-                print_row(name, knowledge, list(pool.map(run, seeds)))
-        limited = partial(run_ours, duration=arguments.duration, communication_range=COMMUNICATION_RANGE_M)
-        for name in arguments.controllers:
-            fractions = list(pool.map(partial(limited, name), seeds))
-            print_row(f"`{name}`", OUR_CONTROLLERS.get(name, ""), fractions)
-        unlimited = partial(run_ours, "lloyd", duration=arguments.duration, communication_range=math.inf)
-        print_row("`lloyd`", "the density and all positions", list(pool.map(unlimited, seeds)))
+        for label, run in runs.items():
+            fractions = list(pool.map(run, range(arguments.worlds)))
+            rows.append(Row(label, knowledge.get(label, ""), fractions))
+            print(format_row(rows[-1]), file=sys.stderr, flush=True)
+    print(format_table(rows))
 
 
 if __name__ == "__main__":
