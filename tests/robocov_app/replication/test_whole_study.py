@@ -588,7 +588,7 @@ class TestPages:
             f"{kind}-301" for kind in planned.UNSEEN
         }
         assert np.isfinite(beyond.unseen.get_values("atlas", "gap")).all()
-        heading = "On maps of other families"
+        heading = "On generated blocks, rooms, caves, mazes"
         assert (
             f"<caption>{heading}" in beyond_page
             and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in beyond_page

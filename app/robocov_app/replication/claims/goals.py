@@ -31,7 +31,7 @@ from robocov_app.replication.claims.thresholds import (
     RARELY,
 )
 from robocov_app.replication.design.contenders import Contender, select_strongest
-from robocov_app.replication.design.plan import Plan
+from robocov_app.replication.design.plan import UNSEEN, Plan
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.results.controller_speed import StepTimes
 from robocov_app.replication.results.outcomes import Outcomes, PairedComparison
@@ -308,7 +308,10 @@ def summarize_goals(goals: Sequence[Claim]) -> str:
 
 
 def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Judge our own controller on map families that its goals do not cover; return None if there are no runs.
+    """Judge our own controller on generated maps on which its goals are not judged.
+
+    The families of these maps are those in `UNSEEN`. Our own controller was developed on maps of the
+    benchmark, which has the same families, and three of them are also families of the paper's claims.
 
     Parameters
     ----------
@@ -317,6 +320,11 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
     own : Contender
     contenders : sequence of Contender
         All contenders, including the paper's strongest ones.
+
+    Returns
+    -------
+    Claim or None
+        None if there are no runs.
     """
     finished = outcomes.select_finite("gap", own.key)
     if not finished.instances:
@@ -334,8 +342,9 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
         f"{len(medians)} generated maps, {len(finished.instances)} runs of {own.label}. "
         f"Highest median gap of a map: {format_amount(medians[worst], '%')} ({worst})."
     )
+    families = f"{', '.join(UNSEEN[:-1])} and {UNSEEN[-1]}"
     statement = (
-        f"On other map families, {own.label} meets limits on gap, contacts and settling, "
+        f"On generated {families}, {own.label} meets limits on gap, contacts and settling, "
         "and its median cost is not above that of the paper's strongest controllers."
     )
     claim = Claim("goal-unseen", GOALS, statement)

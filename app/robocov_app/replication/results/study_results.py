@@ -124,7 +124,7 @@ class BeyondResults:
     outcomes : Outcomes
         Outcomes of all contenders: those of the paper's claims, the baselines, and our controllers.
     unseen : Outcomes or None
-        Outcomes of our main controller and of the paper's strongest contenders on maps of other kinds.
+        Outcomes of our main controller and of the paper's strongest contenders on the maps of `UNSEEN`.
     contenders : tuple of Contender
     gains : Mapping
         Outcomes of the gain grids of the baselines that were tuned, by controller.
