@@ -52,6 +52,13 @@ def test_entries_made_with_an_earlier_version_are_marked() -> None:
 
 
 @pytest.mark.usefixtures("without_plots")
+def test_the_page_links_to_the_corrections() -> None:
+    page = build_page(select_bundled_results("rapf"), "Test")
+    assert page.count('<a href="#corrections">') == page.count('id="corrections"') == 1
+    assert ratings.CORRECTIONS in page
+
+
+@pytest.mark.usefixtures("without_plots")
 def test_an_incomplete_entry_is_listed_separately() -> None:
     results = select_bundled_results("atlas", "rapf")
     _, rapf = results

@@ -98,6 +98,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         anomalies=_build_anomaly_table(labeled_results, _find_default_rapf(results)),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
+        corrections=ratings.CORRECTIONS,
         method=describe_method(),
         entries=_build_entries_table(labeled_results),
     )
