@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import re
+import runpy
+from collections.abc import Sequence
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -10,12 +14,56 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robocov.controllers import CONTROLLERS
 from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.page.anomalies import find_anomalies
 from robocov_app.benchmark.ratings import Rating, build_ratings, get_run_key
+from robocov_app.benchmark.references import RESTARTS
 from robocov_app.benchmark.results import ENTRIES, load_bundled_results, read_result
-from robocov_app.replication.claims.thresholds import MAX_GAP, MAX_MAP_GAP, MIN_AT_REST
+from robocov_app.replication.claims.thresholds import (
+    MAX_GAP,
+    MAX_MAP_GAP,
+    MAX_REST_TIME_S,
+    MAX_STEP_RATIO,
+    MIN_AT_REST,
+    NEVER_WORSE,
+    RARELY,
+)
+from robocov_app.replication.design.plan import UNSEEN
 
 PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
+BENCHMARK_PAGE = PAGE.parent / "benchmark.md"
+
+
+def read_text(page: Path) -> str:
+    """Return a page of the handbook as one line."""
+    return " ".join(page.read_text(encoding="utf-8").split())
+
+
+@cache
+def read_rows(controller: str, track: str) -> Sequence[dict[str, Any]]:
+    """Return the rows of a controller on a track."""
+    return [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
+
+
+def rate(controller: str, track: str) -> Rating:
+    """Return the rating of a controller on a track."""
+    return Rating(controller, track, read_rows(controller, track))
+
+
+def compute_map_medians(controller: str, track: str, metric: str = "gap") -> dict[str, float]:
+    """Return the median of a metric on each map of a track."""
+    values: dict[str, list[float]] = {}
+    for row in read_rows(controller, track):
+        values.setdefault(row["map"], []).append(row[metric])
+    return {name: float(np.median(values_of_map)) for name, values_of_map in values.items()}
+
+
+def count_above(controller: str, other: str, track: str) -> int:
+    """Return the number of maps on which the median cost is more than 1% above that of another controller."""
+    costs = compute_map_medians(controller, track, "mean_distance_m")
+    other_costs = compute_map_medians(other, track, "mean_distance_m")
+    return sum(cost > NEVER_WORSE * other_costs[name] for name, cost in costs.items())
 
 
 def format_row(controller: str, track: str) -> str:
@@ -46,14 +94,16 @@ def format_row(controller: str, track: str) -> str:
 RIVALS = ("rapf", "learned", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 PLAN_CONTROLLERS = {
-    "plans-small": ("learned", "frontier-median", "greedy-submodular", "local-search"),
+    "plans-small": ("frontier-median", "greedy-submodular", "local-search"),
     "plans-medium": ("frontier-median", "greedy-submodular", "local-search", "exemplar"),
     "plans-large": ("frontier-median", "greedy-submodular", "voronoi-graph", "local-search", "exemplar"),
     "plans-crowd": ("voronoi-graph", "local-search", "exemplar"),
 }
 """Controllers on each track of large plans, in addition to those on all of these tracks."""
 PLAN_ROWS = [
-    *product(("atlas", "atlas-shared", "geodesic-lloyd", "tangentbug", "rapf", "lloyd"), PLAN_TRACKS),
+    *product(
+        ("atlas", "atlas-shared", "learned", "geodesic-lloyd", "tangentbug", "rapf", "lloyd"), PLAN_TRACKS
+    ),
     *((controller, track) for track, names in PLAN_CONTROLLERS.items() for controller in names),
 ]
 """Controllers and tracks with runs on large plans."""
@@ -107,13 +157,40 @@ def test_the_best_controller_with_own_information_on_large_plans_agrees_with_the
 
 def test_gaps_in_the_first_table_agree_with_the_entries() -> None:
     first_table = PAGE.read_text(encoding="utf-8").partition("## List of controllers")[0]
-    names = re.findall(r"`([a-z-]+)`", first_table)
-    gaps = re.findall(r"(\d+\.\d)%", first_table)
-    expected = []
-    for name in names:
-        rows = [row for row in read_result(ENTRIES / f"{name}.json.gz")["rows"] if row["track"] == "ideal"]
-        expected.append(f"{100.0 * Rating(name, 'ideal', rows).gap.estimate:.1f}")
-    assert gaps == expected
+    rows = [line.split(" | ") for line in first_table.splitlines() if line.startswith("| ")][1:]
+    tracks = set()
+    for _, choice, gaps in rows:
+        names = re.findall(r"`([a-z-]+)`", choice)
+        track = "unknown-density" if "on Unknown density" in gaps else "ideal"
+        tracks.add(track)
+        expected = [f"{compute_median_gap(name, track):.1f}" for name in names]
+        assert re.findall(r"(\d+\.\d)%", gaps) == expected
+    assert tracks == {"ideal", "unknown-density"}
+
+
+def list_source_words(text: str) -> set[str]:
+    """Return which kinds of sources a text names."""
+    kinds = ("abstract", "summar", "first lines", "documentation")
+    return {kind for kind in kinds if kind in text}
+
+
+def test_the_table_of_sources_agrees_with_the_docstrings() -> None:
+    table = PAGE.read_text(encoding="utf-8").split("### Sources")[1].partition("Two recent methods")[0]
+    listed = []
+    for line in table.splitlines():
+        if not line.startswith("| `"):
+            continue
+        names, sources = line.strip("| ").split(" | ")
+        for name in re.findall(r"`([a-z-]+)`", names):
+            listed.append(name)
+            if sources == "our own work" or "Renzaglia" in sources:
+                continue
+            docstring = " ".join((CONTROLLERS[name].__doc__ or "").split())
+            passage = re.search(r"We (had only|did not have) .*", docstring)
+            assert passage is not None, name
+            assert list_source_words(sources) == list_source_words(passage[0]), name
+            assert ("general knowledge" in sources) == (passage[1] == "did not have"), name
+    assert sorted(listed) == sorted([*CONTROLLERS, "learned"])
 
 
 def test_values_of_rapf_with_one_robot_agree_with_the_entry() -> None:
@@ -124,14 +201,183 @@ def test_values_of_rapf_with_one_robot_agree_with_the_entry() -> None:
 
 
 def test_the_goals_in_the_handbook_are_the_thresholds_of_the_study() -> None:
+    section = PAGE.read_text(encoding="utf-8").split("## The goals of atlas")[1]
     expected = {}
-    for row in PAGE.read_text(encoding="utf-8").split("## The goals of atlas")[1].splitlines():
+    for row in section.splitlines():
         cells = [cell.strip() for cell in row.strip("|").split("|")]
         if len(cells) == 4:
             expected[cells[0]] = cells[1]
     assert expected["median gap, six robots, 71 maps, 60 s"] == f"{100 * MAX_GAP:g}%"
     assert f"median above {100 * MAX_MAP_GAP:g}% on no map" in expected
+    for other in ("rapf", "lloyd"):
+        margin = round(100 * (NEVER_WORSE - 1))
+        assert f"median cost more than {margin}% above that of `{other}` on no map" in expected
+    assert expected["no contact in 142 runs"] == "0"
     assert expected["settled after 60 s"] == f"{100 * MIN_AT_REST:g}%"
+    assert expected["median settling time"] == f"{MAX_REST_TIME_S:g} s"
+    assert expected["the same with 50 robots"] == f"{MAX_STEP_RATIO:g}"
+    assert expected["200 robots in real time"] == "1 s per second"
+    families = f"{', '.join(UNSEEN[:-1])} and {UNSEEN[-1]}"
+    sentence = f"On generated {families}, the study allows contacts in at most {100 * RARELY:g}% of the runs"
+    assert sentence in " ".join(section.split())
+
+
+def judge(text: str, *, is_met: bool) -> str:
+    """Return a cell with a measured value and whether it meets its goal."""
+    return f"{text}, {'met' if is_met else 'missed'}"
+
+
+def build_goal_cells(controller: str) -> dict[str, str]:
+    """Return the cells of a controller in the first table of goals by the first cells of the rows."""
+    rating = rate(controller, "ideal")
+    gap, lossy_gap, noisy_gap, large_gap = (
+        round(compute_median_gap(controller, track), 1) for track in ("ideal", "lossy", "noisy", "large-team")
+    )
+    above = sum(value > MAX_MAP_GAP for value in compute_map_medians(controller, "ideal").values())
+    contacts = sum(row["contacts"] > 0 for row in rating.rows)
+    settled, time = rating.compute_rest()
+    assert time is not None
+    path_length, oracle_length = (
+        np.mean([row["path_length_m"] for row in read_rows(name, "ideal")]) for name in (controller, "oracle")
+    )
+    ratio = path_length / oracle_length
+    cells = {
+        "median gap, six robots, 71 maps, 60 s": judge(f"{gap:.1f}%", is_met=gap <= 100.0 * MAX_GAP),
+        "median above 5% on no map": judge(f"{above}", is_met=above == 0),
+        "no contact in 142 runs": judge(f"{contacts}", is_met=contacts == 0),
+        "settled after 60 s": judge(f"{settled:.0%}", is_met=settled >= MIN_AT_REST),
+        "median settling time": judge(f"{time:.0f} s", is_met=time <= MAX_REST_TIME_S),
+        f"mean path length relative to `oracle` ({oracle_length:.1f} m)": judge(
+            f"{ratio:.1f} ({path_length:.1f} m)", is_met=bool(ratio <= 1.2)
+        ),
+        "median gap with message loss and latency": judge(f"{lossy_gap:.1f}%", is_met=lossy_gap <= gap),
+        "median gap with localization noise of 0.1 m": judge(f"{noisy_gap:.1f}%", is_met=noisy_gap <= gap),
+        "median gap of 24 robots on 20 x 20 m": judge(f"{large_gap:.1f}%", is_met=large_gap <= 1.0),
+    }
+    for other in ("rapf", "lloyd"):
+        count = count_above(controller, other, "ideal")
+        name = f"median cost more than 1% above that of `{other}` on no map"
+        cells[name] = judge(f"{count}", is_met=count == 0)
+    return cells
+
+
+def test_the_first_table_of_goals_agrees_with_the_entries() -> None:
+    section = PAGE.read_text(encoding="utf-8").split("## The goals of atlas")[1].partition("After 120 s")[0]
+    table = {}
+    for line in section.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("| ") and cells[0] != "measure":
+            table[cells[0]] = cells[1:]
+    goal, atlas, shared = table.pop("communication range 3 m: cost at most 1% above that of `atlas-shared`")
+    maps = compute_map_medians("atlas", "short-range")
+    count = len(maps) - count_above("atlas", "atlas-shared", "short-range")
+    assert (goal, atlas, shared) == (f"on {len(maps)} of {len(maps)} maps", f"{count}, missed", "")
+    columns = [build_goal_cells(controller) for controller in ("atlas", "atlas-shared")]
+    assert {name: cells[1:] for name, cells in table.items()} == {
+        name: [column[name] for column in columns] for name in columns[0]
+    }
+
+
+def test_path_lengths_on_large_plans_agree_with_the_entries() -> None:
+    ranges = []
+    for controller in ("atlas", "atlas-shared"):
+        ratios = [
+            np.mean([row["path_length_m"] for row in read_rows(controller, track)])
+            / np.mean([row["path_length_m"] for row in read_rows("oracle", track)])
+            for track in PLAN_TRACKS
+        ]
+        ranges.append(f"{min(ratios):.1f} to {max(ratios):.1f} times")
+    text = read_text(PAGE)
+    assert (
+        f"{ranges[0]} as long as those of `oracle` with `atlas`, and {ranges[1]} with `atlas-shared`" in text
+    )
+
+
+def test_unfinished_runs_of_frontier_median_agree_with_the_entries() -> None:
+    text = read_text(PAGE)
+    ideal_rows = read_rows("frontier-median", "ideal")
+    settled = [row["gap"] for row in ideal_rows if row["settled_at_s"] is not None]
+    moving = [row["gap"] for row in ideal_rows if row["settled_at_s"] is None]
+    assert (
+        f"its median gap is {np.median(settled):.1%} in the {len(settled)} runs that have settled after "
+        f"60 s, and {np.median(moving):.1%} in the other {len(moving)}"
+    ) in text
+    counts = []
+    for track in ("one-robot", "plans-small"):
+        rows = read_rows("frontier-median", track)
+        gaps = [row["gap"] for row in rows if row["settled_at_s"] is None]
+        counts.append((len(gaps), len(rows), np.median(gaps)))
+    (one, one_total, one_gap), (small, small_total, small_gap) = counts
+    assert (
+        f"{one} of {one_total} runs have not settled after 60 s ({one_gap:.1%}), "
+        f"and on Plans small {small} of {small_total} after 240 s ({small_gap:.1%})"
+    ) in text
+    result, rapf = (read_result(ENTRIES / f"{name}.json.gz") for name in ("frontier-median", "rapf"))
+    core_rows = [row for row in result["rows"] if row["track"] in suite.RANKED_TRACKS["core"]]
+    large_gaps = [row for row in core_rows if row["gap"] > 0.2]
+    unsettled_count = sum(row["settled_at_s"] is None for row in large_gaps)
+    assert (
+        f"Of the {len(core_rows)} runs of its [complete entry](benchmark.md#a-submission), "
+        f"{len(large_gaps)} have a gap above 20%, and {unsettled_count} of these have not settled."
+    ) in text
+    rows_by_run = {(row["track"], get_run_key(row)): row for row in result["rows"]}
+    anomalies = find_anomalies(result, rapf)
+    assert anomalies
+    assert 'lists some of its runs under "Runs to look into". None of them has settled, either.' in text
+    for anomaly in anomalies:
+        assert rows_by_run[anomaly.track, (anomaly.map, anomaly.seed)]["settled_at_s"] is None
+
+
+def test_references_of_large_teams_are_described() -> None:
+    tracks = [suite.TRACKS[track] for track in ("plans-large", "plans-crowd")]
+    references = {
+        name: suite.load_frozen_maps()[name]["references"][str(track.robots)]
+        for track in tracks
+        for name in track.maps
+    }
+    assert all(reference["lower_bound_m"] is None for reference in references.values())
+    worst = min(references, key=lambda name: references[name]["agreement"])
+    found = round(RESTARTS * references[worst]["agreement"])
+    text = read_text(PAGE)
+    assert f"None of these {len(references)} plans has a" in text
+    assert f"On {worst}, for example, only {found} of {RESTARTS} searches found it" in text
+
+
+def test_mean_gaps_with_an_unknown_density_agree_with_the_entries() -> None:
+    means = {
+        name: np.mean([row["gap"] for row in read_rows(name, "unknown-density")])
+        for name in ("exploring-lloyd", "atlas-shared")
+    }
+    worst = max(row["gap"] for row in read_rows("atlas-shared", "unknown-density"))
+    text = read_text(PAGE)
+    assert f"The mean gap of `exploring-lloyd` is therefore {means['exploring-lloyd']:.0%}" in text
+    assert f"has a mean gap of {means['atlas-shared']:.0%}, and of {worst:.0%} at most" in text
+
+
+def test_the_learned_policy_is_better_than_rapf_except_for_large_teams() -> None:
+    worse = []
+    for track in suite.TRACKS:
+        if not read_rows("learned", track):
+            continue
+        if compute_median_gap("learned", track) >= compute_median_gap("rapf", track):
+            worse.append(suite.format_heading(track))
+    assert f"a smaller gap than `rapf` on all tracks except {', '.join(worse)}, but" in read_text(PAGE)
+
+
+def test_the_table_of_coverage_control_has_the_rows_of_its_command() -> None:
+    script = runpy.run_path(str(Path(__file__).parents[2] / "bench/bench_coverage_control.py"))
+    text = PAGE.read_text(encoding="utf-8")
+    _, head, body = text.partition(script["HEAD"] + "\n")
+    assert head
+    rows = []
+    for line in body.partition("\n\n")[0].splitlines():
+        label, knowledge, mean, each = line.strip("| ").split(" | ")
+        fractions = [float(value) for value in each.split(", ")]
+        # The mean is that of values with more digits.
+        assert abs(float(mean) - np.mean(fractions)) < 0.0101
+        rows.append((label, knowledge, float(mean)))
+    assert {label: knowledge for label, knowledge, _ in rows} == script["list_labels"]()
+    assert [mean for _, _, mean in rows] == sorted(mean for _, _, mean in rows)
 
 
 def test_the_effect_of_the_factors_of_the_score_agrees_with_the_entries(
@@ -177,14 +423,7 @@ FAILURES_OF_ATLAS = (
     ("large-team", "large-caves-7001"),
 )
 CONTROLLERS_OF_FAILURES = ("atlas", "atlas-shared", "greedy-submodular", "rapf")
-CONTROLLERS_OF_TUNNELS = (
-    "frontier-median",
-    "atlas-shared",
-    "greedy-submodular",
-    "geodesic-lloyd",
-    "rapf",
-    "lloyd",
-)
+CONTROLLERS_OF_TUNNELS = ("atlas", "atlas-shared", "voronoi-graph", "geodesic-lloyd", "rapf")
 
 
 def format_gap_and_path_length(controller: str, track: str, map_name: str) -> tuple[str, str]:
@@ -245,10 +484,124 @@ def test_path_lengths_of_atlas_agree_with_the_entries() -> None:
     assert f"on the track Ideal is {lengths[0]:.1f} m, and {lengths[1]:.1f} m with `rapf`" in text
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS_OF_TUNNELS)
-def test_results_in_tunnels_agree_with_the_entries(controller: str) -> None:
-    gap, path_length = format_gap_and_path_length(controller, "plans-small", "tunnels-7001")
-    assert f"| `{controller}` | {gap} | {path_length} |\n" in FAILURES_PAGE.read_text(encoding="utf-8")
+@pytest.mark.parametrize("track", PLAN_TRACKS)
+def test_the_worst_large_plans_agree_with_the_entries(track: str) -> None:
+    cells = []
+    for controller in ("atlas", "atlas-shared"):
+        gaps = compute_map_medians(controller, track)
+        worst = max(gaps, key=lambda name: gaps[name])
+        cells.append(f"{worst}: {gaps[worst]:.1%} ({compute_map_medians('rapf', track)[worst]:.1%})")
+    row = f"| {suite.format_heading(track)} | {' | '.join(cells)} |"
+    assert f"{row}\n" in FAILURES_PAGE.read_text(encoding="utf-8")
+
+
+def find_tunnels(track: str) -> str:
+    """Return the name of the network of tunnels of a track."""
+    (name,) = (name for name in suite.TRACKS[track].maps if name.startswith("tunnels-"))
+    return name
+
+
+@pytest.mark.parametrize("track", PLAN_TRACKS)
+def test_results_in_tunnels_agree_with_the_entries(track: str) -> None:
+    map_name = find_tunnels(track)
+    cells = [
+        f"{suite.format_heading(track)}, {map_name}",
+        f"{suite.TRACKS[track].robots} robots, {suite.TRACKS[track].duration:g} s",
+    ]
+    cells += [
+        ", ".join(format_gap_and_path_length(controller, track, map_name))
+        for controller in CONTROLLERS_OF_TUNNELS
+    ]
+    assert f"| {' | '.join(cells)} |\n" in FAILURES_PAGE.read_text(encoding="utf-8")
+
+
+def test_statements_on_tunnels_agree_with_the_entries() -> None:
+    small, medium, large, crowd = PLAN_TRACKS
+    gap, path_length = format_gap_and_path_length("frontier-median", small, find_tunnels(small))
+    text = read_text(FAILURES_PAGE)
+    assert f"`frontier-median` reaches a gap of {gap}, with a path of {path_length}" in text
+    gaps = {
+        (controller, track): compute_map_medians(controller, track)[find_tunnels(track)]
+        for controller, track in product(CONTROLLERS_OF_TUNNELS, PLAN_TRACKS)
+    }
+    assert gaps["voronoi-graph", medium] < gaps["atlas-shared", medium]
+    assert gaps["rapf", medium] < gaps["atlas", medium]
+    paths = [
+        compute_map_medians(name, medium, "path_length_m")[find_tunnels(medium)] for name in ("rapf", "atlas")
+    ]
+    assert 0.28 < paths[0] / paths[1] < 0.38
+    for track in (large, crowd):
+        best = min(CONTROLLERS_OF_TUNNELS, key=lambda name: gaps[name, track])
+        assert best == "atlas-shared"
+    for controller, track in product(("atlas", "atlas-shared"), PLAN_TRACKS):
+        for row in read_rows(controller, track):
+            if row["map"] == find_tunnels(track):
+                assert (row["settled_at_s"] is not None) == (track == small)
+
+
+def read_earlier_rows(correction: str, controller: str, track: str) -> list[dict[str, str]]:
+    """Return the rows of a controller on a track before a correction of the benchmark.
+
+    ``earlier_results.csv`` contains rows of entries of earlier versions: "messages" of those before robots
+    shared maps by messages, and "stake" of the last ones with ``stake`` = 0.004.
+    """
+    with Path(__file__).with_name("earlier_results.csv").open(encoding="utf-8", newline="") as file:
+        return [
+            row
+            for row in csv.DictReader(file)
+            if (row["correction"], row["controller"], row["track"]) == (correction, controller, track)
+        ]
+
+
+def select_comparable_rows(
+    correction: str, controller: str, track: str
+) -> tuple[list[dict[str, str]], list[dict[str, Any]], set[str]]:
+    """Return the earlier and current rows with the same cost, and the maps on which the cost has changed."""
+    current_rows = {get_run_key(row): row for row in read_rows(controller, track)}
+    pairs, changed_maps = [], set()
+    for earlier in read_earlier_rows(correction, controller, track):
+        current = current_rows[earlier["map"], int(earlier["seed"])]
+        reference = float(earlier["mean_distance_m"]) / (1.0 + float(earlier["gap"]))
+        if reference == pytest.approx(current["mean_distance_m"] / (1.0 + current["gap"]), rel=1e-5):
+            pairs.append((earlier, current))
+        else:
+            changed_maps.add(earlier["map"])
+    return [earlier for earlier, _ in pairs], [current for _, current in pairs], changed_maps
+
+
+def format_changes(*rows_before_and_after: Sequence[dict[str, Any]]) -> tuple[list[str], str]:
+    """Return the changes of the median, mean and worst gap, and of the number of runs above 5%."""
+    before, after = (np.array([float(row["gap"]) for row in rows]) for rows in rows_before_and_after)
+    cells = [f"{measure(before):.1%} → {measure(after):.1%}" for measure in (np.median, np.mean, np.max)]
+    return cells, f"{(before > 0.05).sum()} → {(after > 0.05).sum()}"
+
+
+@pytest.mark.parametrize(
+    "controller", ["atlas-shared", "greedy-submodular", "frontier-median", "voronoi-graph"]
+)
+def test_changes_by_messages_agree_with_the_entries(controller: str) -> None:
+    before, after, changed_maps = select_comparable_rows("messages", controller, "lossy")
+    cells, counts = format_changes(before, after)
+    assert f"| `{controller}` | {' | '.join(cells)} | {counts} |\n" in BENCHMARK_PAGE.read_text(
+        encoding="utf-8"
+    )
+    assert np.mean([row["gap"] for row in after]) > np.mean([float(row["gap"]) for row in before])
+    text = read_text(BENCHMARK_PAGE)
+    assert f"on {len(before)} of the {len(before) + len(changed_maps)} maps" in text
+    assert f"On the other two, {' and '.join(sorted(changed_maps))}, gaps were closed" in text
+
+
+@pytest.mark.parametrize("controller", ["atlas", "atlas-shared"])
+@pytest.mark.parametrize("track", ["ideal", "short-range", "large-team"])
+def test_changes_by_the_gain_stake_agree_with_the_entries(track: str, controller: str) -> None:
+    before, after, changed_maps = select_comparable_rows("stake", controller, track)
+    assert not changed_maps
+    assert len(before) == len(read_rows(controller, track))
+    cells, _ = format_changes(before, after)
+    first, last = (np.median([float(row["path_length_m"]) for row in rows]) for rows in (before, after))
+    path = f"{first:.1f} → {last:.1f} m"
+    row = f"| {suite.format_heading(track)} | `{controller}` | {' | '.join(cells)} | {path} |"
+    assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
 
 
 def compute_median_gap(controller: str, track: str) -> float:
