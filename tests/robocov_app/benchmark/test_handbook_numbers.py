@@ -97,7 +97,7 @@ PLAN_CONTROLLERS = {
     "plans-small": ("frontier-median", "greedy-submodular", "local-search"),
     "plans-medium": ("frontier-median", "greedy-submodular", "local-search", "exemplar"),
     "plans-large": ("frontier-median", "greedy-submodular", "voronoi-graph", "local-search", "exemplar"),
-    "plans-crowd": ("voronoi-graph", "local-search", "exemplar"),
+    "plans-crowd": ("greedy-submodular", "voronoi-graph", "local-search", "exemplar"),
 }
 """Controllers on each track of large plans, in addition to those on all of these tracks."""
 PLAN_ROWS = [
