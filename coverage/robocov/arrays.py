@@ -1,5 +1,7 @@
 """Small functions on arrays."""
 
+from typing import Any
+
 import numpy as np
 
 from robocov.typing import FloatArray, IntArray
@@ -20,6 +22,30 @@ def copy_read_only(values: object) -> FloatArray:
     array = np.array(values, dtype=np.float64, order="C")
     array.setflags(write=False)
     return array
+
+
+def to_tuples(values: Any) -> Any:
+    """Convert arrays and lists, also inside one another, to tuples, which can be compared and hashed.
+
+    Parameters
+    ----------
+    values : object
+        An array, a list or a tuple. Any other value is returned unchanged.
+
+    Returns
+    -------
+    tuple or object
+
+    Examples
+    --------
+    >>> to_tuples([np.array([1.0, 2.0]), (3, 4)])
+    ((1.0, 2.0), (3, 4))
+    """
+    if isinstance(values, np.ndarray):
+        return to_tuples(values.tolist())
+    if isinstance(values, list | tuple):
+        return tuple(to_tuples(value) for value in values)
+    return values
 
 
 def compute_lengths(vectors: FloatArray) -> FloatArray:

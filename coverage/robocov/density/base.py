@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, CellEdges
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, is_number, quote
 from robocov.typing import FloatArray
 
 MAX_WEIGHT = 1e6
@@ -158,8 +158,8 @@ def require_weight(name: str, value: float, *, above_zero: bool = False) -> None
     ParameterError
         If the weight is out of range.
     """
-    is_large_enough = value > 0.0 if above_zero else value >= 0.0
-    if not (is_large_enough and value <= MAX_WEIGHT):
+    is_in_range = is_number(value) and 0.0 <= value <= MAX_WEIGHT
+    if not is_in_range or (above_zero and value == 0.0):
         lower_limit = "above" if above_zero else "from"
         allowed = f"{lower_limit} 0 to {MAX_WEIGHT:.0f}"
         raise ParameterError(f"{name}: expected a number {allowed}, got {quote(value)}")

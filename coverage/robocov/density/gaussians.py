@@ -22,14 +22,14 @@ accurate to rounding errors.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import compute_lengths
+from robocov.arrays import compute_lengths, to_tuples
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import CellEdges
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, quote, require_number, to_floats
 from robocov.typing import BoolArray, FloatArray, Point
 
 Matrix: TypeAlias = tuple[Point, Point]
@@ -83,15 +83,15 @@ class Gaussian:
 
     Parameters
     ----------
-    center : (x, y), m
+    center : (2,) sequence, m
         The center c, where the Gaussian has its maximum.
     weight : float
         Value at the center, at least 0.
     sigma : float or None, m
         Standard deviation in all directions, from 1e-100 to 1e100.
-    covariance : 2 x 2 nested tuples or None, m²
-        Covariance S, a symmetric and positive definite matrix with variances from 1e-200 to 1e200: an
-        alternative to `sigma`.
+    covariance : (2, 2) sequence or None, m²
+        Covariance S, an alternative to `sigma`: a symmetric and positive definite matrix with variances from
+        1e-200 to 1e200 and an absolute correlation of at most 1 - 5e-10.
 
     Raises
     ------
@@ -121,16 +121,11 @@ class Gaussian:
         if (self.sigma is None) == (self.covariance is None):
             got = "neither" if self.sigma is None else "both"
             raise ParameterError(f"sigma, covariance: expected one of them, got {got}")
-        if self.sigma is not None and not _MIN_SIGMA_M <= self.sigma <= _MAX_SIGMA_M:
-            raise ParameterError(
-                f"sigma: expected a number from {_MIN_SIGMA_M:g} to {_MAX_SIGMA_M:g}, "
-                f"got {quote(self.sigma)} m"
-            )
-        if self.covariance is not None and not _is_valid_covariance(self.covariance):
-            raise ParameterError(
-                "covariance: expected a symmetric, positive definite 2 x 2 matrix with variances from 1e-200 "
-                f"to 1e200, got {quote(self.covariance)} m²"
-            )
+        object.__setattr__(self, "center", _check_center(self.center))
+        if self.sigma is not None:
+            require_number("sigma", self.sigma, _MIN_SIGMA_M, _MAX_SIGMA_M, "m")
+        if self.covariance is not None:
+            object.__setattr__(self, "covariance", _check_covariance(self.covariance))
 
     @property
     def matrix(self) -> Matrix:
@@ -293,6 +288,7 @@ class Gaussians(Density):
     floor: float = 0.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "peaks", to_tuples(self.peaks))
         require_weight("floor", self.floor)
         if not self.upper_bound > 0.0:
             raise ParameterError("floor: expected a number above 0 or a peak with a weight above 0, got 0")
@@ -391,6 +387,30 @@ def _integrate_along_edges(starts: FloatArray, ends: FloatArray) -> _StandardMom
     for values in contributions:
         values[~has_length] = 0.0
     return contributions
+
+
+def _check_center(center: Any) -> Point:
+    """Return a center as a tuple of floats; raise a ParameterError if it is not two finite numbers."""
+    expected = "finite x and y in meters"
+    coordinates = to_floats("center", center, expected)
+    if coordinates.shape != (2,) or not np.isfinite(coordinates).all():
+        raise ParameterError(f"center: expected {expected}, got {quote(center)}")
+    x, y = coordinates.tolist()
+    return x, y
+
+
+def _check_covariance(covariance: Any) -> Matrix:
+    """Return a covariance as tuples of floats; raise a ParameterError if it is not valid."""
+    expected = (
+        "a symmetric, positive definite 2 x 2 matrix in m² with variances from 1e-200 to 1e200 and an "
+        "absolute correlation of at most 1 - 5e-10"
+    )
+    entries = to_floats("covariance", covariance, expected)
+    matrix = to_tuples(entries)
+    if entries.shape != (2, 2) or not _is_valid_covariance(matrix):
+        raise ParameterError(f"covariance: expected {expected}, got {quote(matrix)}")
+    checked: Matrix = matrix
+    return checked
 
 
 def _is_valid_covariance(matrix: Matrix) -> bool:

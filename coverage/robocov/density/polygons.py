@@ -20,6 +20,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import shapely
 
+from robocov.arrays import to_tuples
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
@@ -82,6 +83,8 @@ class WeightedArea:
 
     def __post_init__(self) -> None:
         require_weight("weight", self.weight)
+        object.__setattr__(self, "vertices", to_tuples(self.vertices))
+        object.__setattr__(self, "holes", to_tuples(self.holes))
 
     @cached_property
     def polygon(self) -> shapely.Polygon:
@@ -137,6 +140,7 @@ class WeightedPolygons(Density):
     background: float = 1.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "areas", to_tuples(self.areas))
         require_weight("background", self.background)
         if not self.upper_bound > 0.0:
             raise ParameterError(

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import copy_read_only
+from robocov.arrays import copy_read_only, to_tuples
 from robocov.density import Density
 from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
@@ -94,6 +94,10 @@ class Environment(Drawable):
     extra: Mapping[str, Any] = field(default_factory=dict)
     schema: str | None = None
     density: Density | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "boundary", to_tuples(self.boundary))
+        object.__setattr__(self, "obstacles", to_tuples(self.obstacles))
 
     def __hash__(self) -> int:
         # The other attributes include mappings, which cannot be hashed.

@@ -12,7 +12,7 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import compute_lengths
+from robocov.arrays import compute_lengths, to_tuples
 from robocov.typing import FloatArray, Ring
 
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
@@ -58,6 +58,9 @@ class ObstaclePath:
     points: Ring
     speed: float
     repeat: Repeat = "loop"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", to_tuples(self.points))
 
     @cached_property
     def _round_trip(self) -> tuple[FloatArray, FloatArray]:

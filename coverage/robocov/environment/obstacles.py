@@ -11,6 +11,7 @@ import numpy as np
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from robocov.arrays import to_tuples
 from robocov.environment.obstacle_paths import ObstaclePath
 from robocov.environment.polygons import build_polygon
 from robocov.typing import FloatArray, Point, Ring
@@ -56,6 +57,10 @@ class PolygonObstacle:
     name: str | None = None
     path: ObstaclePath | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", to_tuples(self.vertices))
+        object.__setattr__(self, "holes", to_tuples(self.holes))
+
     @cached_property
     def polygon(self) -> Polygon:
         """Shape of the obstacle."""
@@ -98,6 +103,9 @@ class CircleObstacle:
     radius: float
     name: str | None = None
     path: ObstaclePath | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", to_tuples(self.center))
 
     @cached_property
     def polygon(self) -> Polygon:
@@ -143,6 +151,9 @@ class WallObstacle:
     width: float
     name: str | None = None
     path: ObstaclePath | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", to_tuples(self.points))
 
     @cached_property
     def polygon(self) -> BaseGeometry:

@@ -166,7 +166,10 @@ def _find_weight_issues(model: DensityModel) -> Iterator[Issue]:
             yield Issue.at_path(path, choice_message)
         elif peak.covariance is not None and not _is_covariance(peak.covariance):
             min_variance = f"({MIN_SIZE_M * 1000:g} mm)²"
-            expected = f"a symmetric, positive definite matrix of at least {min_variance} in all directions"
+            expected = (
+                f"a symmetric, positive definite matrix of at least {min_variance} in all directions with an "
+                "absolute correlation of at most 1 - 5e-10"
+            )
             yield Issue.at_path((*path, "covariance"), describe_mismatch(expected, peak.covariance))
     has_base_weight = getattr(model, _BASE_WEIGHTS[model.kind]) > 0.0
     if not has_base_weight and not any(feature.weight > 0.0 for feature in (*peaks, *areas)):

@@ -312,7 +312,21 @@ def test_densities_are_immutable_and_compare_by_value():
         (lambda: Gaussian((0.0, 0.0), -1.0, sigma=1.0), "weight: expected .* got -1.0"),
         (lambda: Gaussian((0.0, 0.0), 1.0), "sigma, covariance: expected one of them, got neither"),
         (lambda: Gaussian((0.0, 0.0), 1.0, sigma=0.0), r"sigma: expected a number from 1e-100 to 1e\+100"),
-        (lambda: Gaussian((0.0, 0.0), 1.0, sigma=1e155), r"1e\+100, got 1e\+155 m"),
+        (lambda: Gaussian((0.0, 0.0), 1.0, sigma=1e155), r"1e\+100 m, got 1e\+155"),
+        (lambda: Gaussian((0.0, 0.0), 1.0, sigma="1"), r"sigma: expected a number .* got '1'"),  # type: ignore[arg-type]
+        (lambda: Gaussian((0.0, 0.0), "1", sigma=1.0), r"weight: expected a number .* got '1'"),  # type: ignore[arg-type]
+        (
+            lambda: Gaussian((np.nan, 0.0), 1.0, sigma=1.0),
+            r"center: expected finite x and y .* got \(nan, 0\.0\)",
+        ),
+        (lambda: Gaussian("ab", 1.0, sigma=1.0), r"center: expected finite x and y in meters, got 'ab'"),  # type: ignore[arg-type]
+        (lambda: Gaussian((1.0, 0.0, 3.0), 1.0, sigma=1.0), "center: expected finite x and y"),  # type: ignore[arg-type]
+        (lambda: Gaussian((0.0, 0.0), 1.0, covariance=1.0), "covariance: expected a symmetric"),  # type: ignore[arg-type]
+        (lambda: Gaussian((0.0, 0.0), 1.0, covariance=np.eye(3)), "covariance: expected a symmetric"),  # type: ignore[arg-type]
+        (
+            lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1.0, 1.0 - 2e-10), (1.0 - 2e-10, 1.0))),
+            "covariance: expected .* an absolute correlation of at most 1 - 5e-10, got",
+        ),
         (lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1e-300, 0.0), (0.0, 1e-300))), "positive definite"),
         (lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1.0, 2.0), (2.0, 1.0))), "positive definite"),
         (lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1.0, 0.2), (0.1, 1.0))), "symmetric"),
@@ -334,6 +348,20 @@ def test_densities_are_immutable_and_compare_by_value():
 def test_invalid_densities_are_rejected(build, message):
     with pytest.raises(ParameterError, match=message):
         build()
+
+
+def test_densities_from_arrays_equal_those_from_tuples():
+    covariance = np.cov(np.random.default_rng(0).normal(size=(2, 50)))
+    from_arrays = Gaussian(np.array([2.0, 1.0]), 1.0, covariance=covariance)  # type: ignore[arg-type]
+    (xx, xy), (yx, yy) = covariance.tolist()
+    from_tuples = Gaussian((2.0, 1.0), 1.0, covariance=((xx, xy), (yx, yy)))
+    assert Gaussians([from_arrays]) == Gaussians((from_tuples,))  # type: ignore[arg-type]
+    assert hash(from_arrays) == hash(from_tuples)
+    ring = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0))
+    hole = ((2.0, 1.0), (3.0, 1.0), (3.0, 2.0))
+    area = WeightedArea(np.array(ring), 3.0, [np.array(hole)])  # type: ignore[arg-type]
+    assert WeightedPolygons([area]) == WeightedPolygons((WeightedArea(ring, 3.0, (hole,)),))  # type: ignore[arg-type]
+    assert hash(area) == hash(WeightedArea(ring, 3.0, (hole,)))
 
 
 @pytest.mark.parametrize(

@@ -10,16 +10,19 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from example_map import DOCUMENT, SCHEMA, edit
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import (
     CircleObstacle,
     DiscStart,
     Environment,
+    ObstaclePath,
     PointsStart,
     PolygonObstacle,
     UniformStart,
@@ -36,6 +39,28 @@ from robocov.mapfile import (
 )
 
 # What is read
+
+
+def test_a_map_built_from_arrays_is_saved_and_equals_the_one_that_is_loaded(tmp_path: Path) -> None:
+    corners = np.array([[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]])
+    boundary: Any = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+    obstacles: Any = [
+        PolygonObstacle(5.0 * corners - 1.0, [corners + [5.5, 4.0]]),  # type: ignore[arg-type]
+        CircleObstacle(np.array([8.0, 2.0]), 0.3, path=ObstaclePath(corners[:2], 0.5)),  # type: ignore[arg-type]
+        WallObstacle(corners, 0.1),  # type: ignore[arg-type]
+    ]
+    starts: Any = {
+        "disc": DiscStart(np.array([2.0, 8.0]), 0.5),  # type: ignore[arg-type]
+        "points": PointsStart(np.array([[2.0, 7.0]])),  # type: ignore[arg-type]
+    }
+    covariance: Any = np.array([[2.0, 0.5], [0.5, 1.0]])
+    peak = Gaussian(np.array([5.0, 5.0]), 4.0, covariance=covariance)  # type: ignore[arg-type]
+    environment = Environment("arrays", boundary, obstacles, starts, density=Gaussians((peak,), 1.0))
+    path = tmp_path / "arrays.json"
+    save_map(environment, path)
+    loaded = load_map(path)
+    assert environment == loaded
+    assert hash(environment) == hash(loaded)
 
 
 def test_every_key_of_a_document_is_read() -> None:

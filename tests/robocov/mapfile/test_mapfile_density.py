@@ -95,6 +95,15 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
             "density.peaks[0].covariance: expected a symmetric, positive definite",
         ),
         (
+            {
+                "kind": "gaussians",
+                "peaks": [
+                    {"center": [1, 2], "weight": 1, "covariance": [[1e6, 1e6 - 1e-4], [1e6 - 1e-4, 1e6]]}
+                ],
+            },
+            "in all directions with an absolute correlation of at most 1 - 5e-10",
+        ),
+        (
             {"kind": "polygons", "background": 0, "areas": []},
             "density: expected at least one weight above 0, got none",
         ),
