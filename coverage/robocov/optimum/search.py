@@ -22,10 +22,12 @@ from robocov.arrays import compute_lengths, copy_read_only
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
+from robocov.environment.packing import pack_densely
 from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import apply_best_swaps, run_lloyd, seed_sources
 from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
+from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import BoolArray, FloatArray, IntArray
 
 MAX_ROBOTS = 500
@@ -255,8 +257,8 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
     require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
     if not (is_number(seed, Integral) and seed >= 0):
         raise ParameterError(f"seed: expected a whole number of at least 0, got {quote(seed)}")
-    if not (is_number(radius) and 0.0 < radius < math.inf):
-        raise ParameterError(f"radius: expected a number above 0 m, got {quote(radius)}")
+    limits = TEAM_PARAMETERS["radius"]
+    require_number("radius", radius, limits.minimum, limits.maximum, limits.unit)
 
 
 def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
@@ -304,13 +306,17 @@ class _Search:
         areas = self.space.components
         site_counts = np.bincount(site_components, minlength=len(areas))
         usable = [k for k, area in enumerate(areas) if not area.is_empty and site_counts[k]]
+        if not usable:
+            raise ParameterError(
+                f"radius: no space for a robot of radius {cost.radius:g} m in map {cost.environment.name!r}"
+            )
         # The components are sorted by area. The robots occupy the largest ones.
         covered = usable[:robot_count]
         candidates = self._spread_candidates(covered)
         candidate_counts = [len(points) for points in candidates]
         self.candidate_components = np.repeat(covered, candidate_counts).astype(np.intp)
         if len(self.candidate_components) < robot_count:
-            capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
+            capacity = len(self.candidate_components)
             raise ParameterError(
                 f"robots: expected at most about {capacity}, as many as fit with radius {cost.radius:g} m in "
                 f"map {cost.environment.name!r}, got {robot_count}"
@@ -322,13 +328,21 @@ class _Search:
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
 
     def _spread_candidates(self, covered: list[int]) -> list[FloatArray]:
-        """Return the candidate positions in each of the covered components, (c, 2) m each."""
+        """Return the candidate positions in each of the covered components, (c, 2) m each.
+
+        There may be fewer than robots only if the robots do not fit.
+        """
         areas = [self.space.components[k] for k in covered]
         total_area = sum(area.area for area in areas)
         min_candidates = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * self.robot_count)
         # Each candidate gets a square of the same area, but robots at adjacent candidates must not overlap.
         spacing = max(math.sqrt(total_area / min_candidates), self.space.spacing)
-        return [_spread_points(area, spacing) for area in areas]
+        candidates = [_spread_points(area, spacing) for area in areas]
+        if sum(len(points) for points in candidates) >= self.robot_count:
+            return candidates
+        # The team almost fills the free space: spread points, which form a square grid, are too few.
+        packings = [pack_densely(area, self.space.spacing) for area in areas]
+        return [max(pair, key=len) for pair in zip(candidates, packings, strict=True)]
 
     def run_restart(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> _Outcome:
         """Choose starting positions by the distance table, and descend the exact cost from there.

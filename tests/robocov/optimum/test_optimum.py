@@ -266,8 +266,19 @@ def test_robots_fill_a_small_room_and_too_many_are_rejected():
         ParameterError, match=r"robots: expected at most about \d\d, as many as fit with radius 0\.1 m in map"
     ):
         find_optimum(closet, 60, lattice=32)
-    with pytest.raises(ParameterError, match=r"robots: expected at most about 0, .* in map 'closet'"):
+    with pytest.raises(
+        ParameterError, match=r"radius: no space for a robot of radius 0\.7 m in map 'closet'"
+    ):
         find_optimum(closet, 1, radius=0.7)
+
+
+def test_the_search_places_teams_that_only_a_dense_packing_holds():
+    """A square grid of the same spacing has only 25 points."""
+    closet = build_room(1.2, 1.2, name="closet")
+    assert len(closet.start().sample(28)) == 28
+    best = find_optimum(closet, 28, lattice=16, restarts=1)
+    assert (pdist(best.positions) >= 0.2).all()
+    assert (shapely.distance(closet.free.boundary, shapely.points(best.positions)) >= 0.1).all()
 
 
 def test_larger_robots_keep_farther_away():
@@ -287,8 +298,9 @@ def test_larger_robots_keep_farther_away():
         ({"restarts": 0}, "restarts: expected a whole number from 1 to 100000, got 0"),
         ({"restarts": True}, "restarts: expected a whole number from 1 to 100000, got True"),
         ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
-        ({"radius": 0.0}, "radius: expected a number above 0 m, got 0.0"),
-        ({"radius": float("nan")}, "radius: expected a number above 0 m, got nan"),
+        ({"radius": 0.0}, "radius: expected a number from 0.001 to 1000 m, got 0.0"),
+        ({"radius": float("nan")}, "radius: expected a number from 0.001 to 1000 m, got nan"),
+        ({"radius": 1e-5}, "radius: expected a number from 0.001 to 1000 m, got 1e-05"),
         ({"lattice": 0}, "lattice: expected a whole number from 1 to 4096, got 0"),
     ],
 )

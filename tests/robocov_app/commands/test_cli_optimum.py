@@ -151,8 +151,8 @@ def test_figures_are_reproducible_in_both_themes(tmp_path: Path, capsys: pytest.
         (("rooms", "--lattice", "1"), "--lattice: expected a whole number from 2 to 2048, got 1"),
         (("rooms", "--seed", "-1"), "--seed: expected a whole number of at least 0, got -1"),
         (("rooms", "--precision", "0"), "--precision: expected a number from 0.00001 to 1, got 0.0"),
-        (("rooms", "--radius", "-1"), "radius: expected a number above 0 m, got -1.0"),
-        (("square", "--radius", "6"), "robots: expected at most about 0, as many as fit with radius 6 m in"),
+        (("rooms", "--radius", "-1"), "radius: expected a number from 0.001 to 1000 m, got -1.0"),
+        (("square", "--radius", "6"), "radius: no space for a robot of radius 6 m in map"),
         (("rooms", "--plot", "a.jpg"), "'.jpg'"),
         (("--run", "nowhere"), "nowhere: expected the folder of a run"),
         (
