@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Integral
@@ -12,7 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import compute_lengths
+from robocov.arrays import compute_lengths, to_tuples
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.packing import (
     bound_point_count,
@@ -23,6 +22,7 @@ from robocov.environment.packing import (
     pack_randomly,
 )
 from robocov.errors import StartError, format_count, is_number, quote
+from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray, Point
 
 MIN_START_GAP_RADII = 0.02
@@ -63,6 +63,9 @@ class DiscStart:
 
     center: Point
     radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", to_tuples(self.center))
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,9 @@ class PointsStart:
     """
 
     positions: tuple[Point, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", to_tuples(self.positions))
 
 
 StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
@@ -170,13 +176,15 @@ class Start:
         """
         self._require_whole_number("robots", n, 1)
         self._require_whole_number("seed", seed, 0)
-        if not 0.0 < radius < math.inf:
-            raise self._build_error(f"radius: expected a number above 0 (m), got {radius!r}")
+        self._require_radius(radius)
         if isinstance(self.spec, PointsStart):
             return self._take_given_positions(n, radius, self.spec.positions)
         area = self.compute_center_area(radius)
         if area.is_empty:
-            raise self._build_error(f"no space for a robot of radius {radius:g} m. Try a wider start.")
+            suggestion = (
+                "a wider start" if isinstance(self.spec, DiscStart) else "a smaller robot or another map"
+            )
+            raise self._build_error(f"no space for a robot of radius {radius:g} m. Try {suggestion}.")
         points = _sample_apart(np.random.default_rng([seed, n]), area, n, compute_start_spacing(radius))
         if len(points) < n:
             raise self._build_error(self._describe_lack_of_space(n, radius))
@@ -237,6 +245,13 @@ class Start:
                 f"{name}: expected a whole number of at least {minimum}, got {quote(value)}"
             )
 
+    def _require_radius(self, radius: object) -> None:
+        limits = TEAM_PARAMETERS["radius"]
+        if not is_number(radius) or not limits.minimum <= radius <= limits.maximum:
+            raise self._build_error(
+                f"radius: expected {limits.describe()} {limits.unit}, got {quote(radius)}"
+            )
+
     def _describe_lack_of_space(self, n: int, radius: float) -> str:
         capacity = self.estimate_capacity(radius)
         suggestions = ["fewer or smaller robots"]
@@ -244,8 +259,8 @@ class Start:
             capacity_everywhere = Start("uniform", UniformStart(), self.free).estimate_capacity(radius)
             suggestions.append(f"start 'uniform' (space for about {capacity_everywhere})")
         return (
-            f"space for about {capacity} robots of radius {radius:g} m, but {n} were requested. "
-            f"Try {', '.join(suggestions)} or another map."
+            f"space for about {format_count(capacity, 'robot')} of radius {radius:g} m, "
+            f"but {n} were requested. Try {', '.join(suggestions)} or another map."
         )
 
     def _take_given_positions(self, n: int, radius: float, positions: Sequence[Point]) -> FloatArray:

@@ -112,6 +112,24 @@ def test_a_start_without_space_is_reported() -> None:
         Start("slit", DiscStart((5.0, 5.0), 0.5), shapely.box(0, 4.95, 10, 5.05)).sample(1)
 
 
+def test_suggestions_suit_the_start() -> None:
+    closet = shapely.box(0.0, 0.0, 0.3, 0.3)
+    with pytest.raises(StartError, match=r"0\.2 m\. Try a wider start\.$"):
+        Start("slit", DiscStart((0.1, 0.1), 0.1), closet).sample(1, radius=0.2)
+    with pytest.raises(StartError, match=r"0\.2 m\. Try a smaller robot or another map\.$"):
+        Start("uniform", UniformStart(), closet).sample(1, radius=0.2)
+    with pytest.raises(StartError, match=r"space for about 1 robot of radius 0\.1 m, but 2 were requested"):
+        Start("uniform", UniformStart(), closet).sample(2)
+
+
+@pytest.mark.parametrize("radius", ["a", None, True, 0.0, 1e-200, np.nan, np.inf])
+def test_invalid_radii_are_rejected(radius: object) -> None:
+    with pytest.raises(
+        StartError, match=r"start 'all': radius: expected a number from 0\.001 to 1000 m, got "
+    ):
+        Start("all", UniformStart(), SQUARE).sample(2, radius=radius)  # type: ignore[arg-type]
+
+
 def test_a_disc_that_only_touches_the_space_of_centers_has_no_space() -> None:
     start = Start("rim", DiscStart((0.0, 5.0), compute_start_clearance(0.1)), SQUARE)
     assert start.estimate_capacity(0.1) == 0
