@@ -225,7 +225,7 @@ def _measure_connectivity_at(record: Record, step: int) -> Connectivity:
     return measure_connectivity(record.positions[step, robots], record.team.communication_range[robots])
 
 
-def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOLERANCE) -> float:
+def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOLERANCE) -> float | None:
     """Find the time from which the mean distance stays near its final value.
 
     Parameters
@@ -237,10 +237,12 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
 
     Returns
     -------
-    float, s
-        Time of a sample of the history.
+    float or None, s
+        Time of a sample of the history. None if the final value is not finite, because no robot works then.
     """
     mean_distance = history.mean_distance
+    if not np.isfinite(mean_distance[-1]):
+        return None
     is_near_final = np.abs(mean_distance - mean_distance[-1]) <= tolerance * mean_distance[-1]
     # The sample after the last one that is not near the final value; the first sample if all are near.
     last_not_near = int(np.flatnonzero(~is_near_final).max(initial=-1))

@@ -135,10 +135,11 @@ def test_a_ring_and_extreme_graphs_have_their_known_connectivity() -> None:
         ([1.0, 0.9, 1.0], 2.0),
         ([2.0, 1.0], 1.0),
         ([3.0], 0.0),
+        ([2.0, np.nan, np.nan], None),
     ],
 )
 def test_the_cost_is_near_its_final_value_after_the_last_deviation(
-    values: list[float], expected: float
+    values: list[float], expected: float | None
 ) -> None:
     assert find_time_near_final(build_history(values)) == expected
 
