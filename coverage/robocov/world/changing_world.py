@@ -81,6 +81,7 @@ class ChangingWorld:
             self.velocities = np.array(velocities, dtype=float)
         self.steering = initialize_steering(team, self.velocities, steering)
         self.is_working = conditions.find_working_robots(time, len(team))
+        self._stop_idle_robots()
         self._failed = conditions.find_failed_robots(time, len(team))
         is_absent = ~(self.is_working | self._failed)
         for join in conditions.joins:
@@ -164,12 +165,15 @@ class ChangingWorld:
             self.positions[robot] = self._find_joining_position(robot, is_present, time)
             is_present[robot] = True
         self.is_working = is_working
-        self.velocities[~is_working] = 0.0
-        if self.steering is not None:
-            # Robots that do not work do not turn.
-            self.steering = self.steering.copy()
-            self.steering[:, _TURNING_RATE] *= is_working
+        self._stop_idle_robots()
         self._build_world()
+
+    def _stop_idle_robots(self) -> None:
+        """Set the velocities and turning rates of the robots that do not work to zero."""
+        self.velocities[~self.is_working] = 0.0
+        if self.steering is not None:
+            self.steering = self.steering.copy()
+            self.steering[:, _TURNING_RATE] *= self.is_working
 
     def _find_joining_position(self, robot: int, is_present: BoolArray, time: float) -> tuple[float, float]:
         """Return the free position nearest to the position at which a robot should join."""

@@ -70,6 +70,18 @@ def test_robots_that_have_not_joined_are_absent() -> None:
     assert changing.positions[1].tolist() == [3.0, 4.0]
 
 
+def test_robots_that_do_not_work_at_the_start_are_at_rest() -> None:
+    """Robot 1 has failed, and robot 2 has not joined yet; robot 3 moves as given."""
+    conditions = Conditions(failures=((1, 0.0),), joins=((2, 1.0),))
+    velocities = np.array([[0.5, 0.0], [0.5, 0.0], [0.0, 0.5]])
+    steering = np.array([[0.0, 0.3], [0.0, 0.3], [1.5, 0.3]])
+    team = Team.homogeneous(3, kinematics="unicycle")
+    changing = ChangingWorld(conditions, HALL, team, STARTS[:3], velocities, steering=steering)
+    assert changing.velocities.tolist() == [[0.0, 0.0], [0.0, 0.0], [0.0, 0.5]]
+    assert changing.steering is not None
+    assert changing.steering.tolist() == [[0.0, 0.0], [0.0, 0.0], [1.5, 0.3]]
+
+
 def test_a_robot_joins_next_to_one_that_occupies_its_position() -> None:
     starts = np.array([[5.0, 4.0], [1.0, 1.0]])
     changing = build_world(Conditions(joins=((2, 1.0, (5.05, 4.0)),)), starts)
