@@ -89,6 +89,12 @@ class Region:
         ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
         # A collinear vertex would divide an edge into two with the same normal.
         ring = _remove_collinear_vertices(ring)
+        if len(ring) < 3:
+            # All corners of an extremely thin region count as collinear.
+            raise InputError(
+                "region: expected an outer boundary with at least 3 corners that are not collinear, "
+                f"got {quote(points.tolist())}"
+            )
         edges = np.roll(ring, -1, axis=0) - ring
         lengths = compute_lengths(edges)
         normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths[:, None]

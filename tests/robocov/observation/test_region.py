@@ -30,3 +30,9 @@ def test_a_region_without_area_is_rejected(count: int) -> None:
     line = np.arange(count)[:, None] * np.array([[1.0, 2.0]])
     with pytest.raises(InputError, match="region: expected an outer boundary with an area above 0"):
         Region(line)
+
+
+def test_a_region_whose_corners_all_count_as_collinear_is_rejected() -> None:
+    """The sine of the change of direction at the apex is tiny as well: it is almost a half turn."""
+    with pytest.raises(InputError, match=r"at least 3 corners that are not collinear, got \[\[0\.0, 0\.0\]"):
+        Region(np.array([[0.0, 0.0], [1e4, 0.0], [5e3, 1e-6]]))
