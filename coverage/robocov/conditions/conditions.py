@@ -144,7 +144,9 @@ class Conditions:
         object.__setattr__(self, "failures", build_events("failures", Failure, self.failures))
         object.__setattr__(self, "joins", build_events("joins", Join, self.joins))
         if not is_number(self.seed, Integral) or self.seed < 0:
-            raise ParameterError(f"conditions.seed: expected a whole number from 0, got {quote(self.seed)}")
+            raise ParameterError(
+                f"conditions.seed: expected a whole number of at least 0, got {quote(self.seed)}"
+            )
         if self.density not in get_args(DensityKnowledge):
             raise ParameterError(f"conditions.density: expected known or sensed, got {quote(self.density)}")
         self._check_forget_after()

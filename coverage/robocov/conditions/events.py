@@ -171,8 +171,10 @@ def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[E
     Raises
     ------
     ParameterError
-        If a value is out of range, or a robot has more than one event.
+        If the values are not iterable, a value is out of range, or a robot has more than one event.
     """
+    if not isinstance(values, Iterable):
+        raise ParameterError(f"conditions.{name}: expected a sequence of events, got {quote(values)}")
     events: dict[int, Event] = {}
     for k, value in enumerate(values):
         event = _build_event(f"conditions.{name}[{k}]", kind, value)

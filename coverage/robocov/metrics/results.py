@@ -266,7 +266,7 @@ class Results:
         run_count = len(self)
         caption = f"{format_count(run_count, 'run')} of {escape(str(self.folder))}"
         if run_count > len(first_rows):
-            caption += f"; the first {len(first_rows)}"
+            caption += f" (first {len(first_rows)} shown)"
         return escape_controls(
             f'<div style="overflow-x: auto"><table style="white-space: nowrap"><caption>{caption}</caption>'
             f"<thead><tr>{header}</tr></thead><tbody>{''.join(body)}</tbody></table></div>"

@@ -16,7 +16,7 @@ from robocov.team import MAX_ROBOTS
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), expect("a number above 0 (s)")]
 """A duration above 0, s."""
-Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), expect("a number from 0 (s)")]
+Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), expect("a number of at least 0 (s)")]
 """A simulation time, s."""
 RobotNumber: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), expect("the number of a robot, from 1")]
 """The number of a robot, from 1."""
@@ -24,7 +24,7 @@ RobotKey: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), expect("t
 """The number of a robot as the key of an object."""
 Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), expect("a point [x, y]")]
 """x and y, m."""
-Seed: TypeAlias = Annotated[int, Field(ge=0), expect("a whole number from 0")]
+Seed: TypeAlias = Annotated[int, Field(ge=0), expect("a whole number of at least 0")]
 """The seed of a random start."""
 
 
@@ -122,7 +122,7 @@ class RunDocument(Document):
     team: dict[str, Any]
     start: Annotated[str | None, expect("the name of a start, or null")]
     starts_m: list[Point] = Field([])
-    seed: Annotated[Seed | None, expect("a whole number from 0, or null")]
+    seed: Annotated[Seed | None, expect("a whole number of at least 0, or null")]
     dt_s: Seconds
     duration_s: Time = 0.0
     lattice: Annotated[int | None, Field(ge=2, le=2048), expect("a whole number from 2 to 2048")] = None

@@ -40,7 +40,7 @@ class ScenarioDocument(Document):
     controller: ControllerEntry = ControllerEntry()
     team: dict[str, Any] = Field({})
     start: Annotated[str | None, expect("the name of a start, or null")] = None
-    seed: Annotated[Seed | None, expect("a whole number from 0, or null")] = 0
+    seed: Annotated[Seed | None, expect("a whole number of at least 0, or null")] = 0
     starts_m: Annotated[list[Point] | None, expect("a list of points [x, y], or null")] = None
     start_velocities_m_per_s: Annotated[list[Point] | None, expect("a list of [x, y], or null")] = None
     start_steering: Annotated[list[Point] | None, expect("a list of [heading, turning rate], or null")] = None

@@ -9,7 +9,7 @@ import shapely
 
 from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Environment
-from robocov.errors import ParameterError, format_position, is_number, quote
+from robocov.errors import ParameterError, format_count, format_position, is_number, quote
 from robocov.team import Team
 
 MIN_DT_S = 1e-4
@@ -84,7 +84,8 @@ def check_team(team: Any, robot_count: int) -> Team:
     if not isinstance(team, Team):
         raise ParameterError(f"team: expected a Team, got {quote(team)}")
     if len(team) != robot_count:
-        raise ParameterError(f"team: expected {robot_count} robots, one for each start, got {len(team)}")
+        expected = format_count(robot_count, "robot")
+        raise ParameterError(f"team: expected {expected}, one for each start, got {len(team)}")
     return team
 
 

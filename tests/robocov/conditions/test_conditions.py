@@ -65,6 +65,8 @@ def test_conditions_are_ideal_unless_one_has_an_effect() -> None:
             {"failures": ((1, math.inf),)},
             r"conditions.failures\[0\]: expected a time from 0 to 1000000 s, got inf",
         ),
+        ({"failures": 5}, r"conditions.failures: expected a sequence of events, got 5"),
+        ({"joins": None}, r"conditions.joins: expected a sequence of events, got None"),
         ({"failures": (3,)}, r"conditions.failures\[0\]: expected a robot and a time, got 3"),
         (
             {"joins": ((1, 2, (1, 2, 3)),)},
@@ -78,7 +80,7 @@ def test_conditions_are_ideal_unless_one_has_an_effect() -> None:
             {"joins": ((2, 5),), "failures": ((2, 5),)},
             "expected robot 2 to join before it fails at 5 s, got 5 s",
         ),
-        ({"seed": -1}, "conditions.seed: expected a whole number from 0, got -1"),
+        ({"seed": -1}, "conditions.seed: expected a whole number of at least 0, got -1"),
     ],
 )
 def test_invalid_conditions_are_rejected(parameters: dict[str, object], message: str) -> None:

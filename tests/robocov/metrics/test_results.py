@@ -183,7 +183,7 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
     write_table(many, ROWS * 20)
     shown = read_results(many)._repr_html_()
     assert shown.count("<tr>") == 1 + 10
-    assert "40 runs of" in shown and "the first 10" in shown
+    assert "40 runs of" in shown and "(first 10 shown)" in shown
 
 
 @pytest.mark.parametrize(

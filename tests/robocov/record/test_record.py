@@ -222,7 +222,10 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         (edit_document("dt_s"), "run.json: dt_s: missing"),
         (edit_document("dt_s", to=-1), "run.json: dt_s: expected a number above 0 (s), got -1"),
         (edit_document("dt_s", to="0.02"), 'run.json: dt_s: expected a number above 0 (s), got "0.02"'),
-        (edit_document("seed", to=-3), "run.json: seed: expected a whole number from 0, or null, got -3"),
+        (
+            edit_document("seed", to=-3),
+            "run.json: seed: expected a whole number of at least 0, or null, got -3",
+        ),
         (
             edit_document("start", to=["corner"]),
             'run.json: start: expected the name of a start, or null, got ["corner"]',
@@ -287,7 +290,7 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         ),
         (
             edit_document("session", "edits", to=[{"from_s": 0, "to_s": "soon", "robots": [1]}]),
-            'run.json: session.edits[0].to_s: expected a number from 0 (s), got "soon"',
+            'run.json: session.edits[0].to_s: expected a number of at least 0 (s), got "soon"',
         ),
         (
             lambda folder: (folder / "record.npz").write_bytes(b"PK\x03\x04 no"),

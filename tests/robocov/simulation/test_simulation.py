@@ -384,7 +384,7 @@ def test_a_state_has_two_finite_numbers_for_each_robot() -> None:
 
 
 def test_team_and_starts_must_agree(empty: Environment) -> None:
-    with pytest.raises(ParameterError, match="team: expected 1 robots, one for each start, got 3"):
+    with pytest.raises(ParameterError, match="team: expected 1 robot, one for each start, got 3"):
         Simulation(empty, Rapf(), [[1.0, 1.0]], Team.homogeneous(3))
 
 
