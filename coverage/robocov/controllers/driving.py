@@ -279,7 +279,7 @@ def find_nearest_allowed_points(
     Returns
     -------
     nearest : (n, 2) array
-        A point that is not allowed if `is_feasible` is false.
+        Nearest allowed points. Where `is_feasible` is false, a point that violates a constraint.
     is_feasible : (n,) bool array
         Whether there is any allowed point.
 

@@ -339,9 +339,10 @@ class Poduri(BaseController):
 
     We did not have the full text of the paper; details may differ. The following choices are our own. If at
     most K robots are within η R_c of a robot, the links to its K nearest neighbors are critical for it, even
-    if they are not about to break. Robots know only positions of others: each also keeps a link that is
-    critical for the neighbor, according to the positions that it knows. The closest obstacle point repels
-    with (24), within `rho_obs`.
+    if they are not about to break. Each robot also keeps a link that is critical for the neighbor, according
+    to the positions that it knows. The R_c of a link is the smaller one of its two robots, because the link
+    breaks there; the communication ranges of the others are assumed to be known. The closest obstacle point
+    repels with (24), within `rho_obs`.
 
     Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
     able to stop within (1 - η) R_c.

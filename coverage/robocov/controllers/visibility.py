@@ -74,8 +74,8 @@ class Visibility(BaseController):
 
     We had only the paper's abstract (Automatica 53, 195-207), not its full text; details may differ. In the
     paper, robots send each other their views. Here they send positions, and a robot assumes that a neighbor
-    sees a point unless its own scan shows an obstacle in the line between the two. Robots also slow down to
-    avoid collisions, which is our own addition.
+    sees a point unless its own scan shows an obstacle in the line between the two. The sensing ranges of the
+    others are assumed to be known. Robots also slow down to avoid collisions, which is our own addition.
     """
 
     name = "visibility"

@@ -114,7 +114,7 @@ def find_narrow_gaps(free: MultiPolygon, max_width: float) -> tuple[Gap, ...]:
     free : MultiPolygon, m
         Free space.
     max_width : float, m
-        All gaps that are found are narrower.
+        All gaps that are found are narrower, before their widths are rounded.
 
     Returns
     -------

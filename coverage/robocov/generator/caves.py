@@ -108,6 +108,7 @@ def build_cave(
         if abs(builder.compute_excess_fraction(free_space)) > _FRACTION_TOLERANCE:
             return None
         gaps = find_narrow_gaps(MultiPolygon([free_space]), request.gap)
+        # Widths are rounded, so that a gap may appear to be exactly as wide as required.
         narrow_gaps = [gap for gap in gaps if gap.width < request.gap]
         if not narrow_gaps:
             return _build_obstacles(request, outline, pillars)

@@ -275,11 +275,12 @@ def _mark_passed_cells(
     directions: FloatArray,
     lengths: FloatArray,
 ) -> None:
-    """Mark the cells that rays pass through as free; walls only become less certain.
+    """Mark the cells that rays pass through as free, or as less certain walls.
 
-    The states of walls are numbers from `WALL`, the least certain, to `CERTAIN_WALL`. A ray that passes
-    through lowers the number by 1, so that several rays are needed to remove a certain wall. Rays are sampled
-    at regular steps, and the last step before their ends is left out.
+    The states of walls are numbers from `WALL`, the least certain, to `CERTAIN_WALL`. Rays are sampled at
+    regular steps, and the last step before their ends is left out. Each sample in a wall lowers its number by
+    1, and a wall whose number is `WALL` becomes free. A ray has one or two samples in a cell that it crosses,
+    so that two to four rays remove a certain wall.
     """
     rows, columns = state.shape
     step = _RAY_STEP_CELLS * grid.cell_size

@@ -208,7 +208,7 @@ def _improve_goals(table: FloatArray, chosen: IntArray, team: TeamSituation, min
 def _move_first_goal(
     table: FloatArray, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
 ) -> IntArray:
-    """Return the goals, (k,), after that of the first robot has moved to the best candidate in its own cell.
+    """Return the goals, (k,), with that of the first robot moved to the best candidate in its own cell.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: FloatArray) -> CellEdge
     """Build the intersections of cells with discs around their generators, as polygons.
 
     Chords replace the arcs of the discs. A chord spans at most 1/128 of a turn, so that the area of the
-    polygon of a whole disc is 0.04% smaller than that of the disc.
+    polygon of a whole disc is at most 0.04% smaller than that of the disc.
 
     Parameters
     ----------

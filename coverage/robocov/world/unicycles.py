@@ -24,7 +24,8 @@ Guarantees:
 
 - Neither the wheels nor the turning rate exceed their limits. In a substep, a unicycle gains no more speed
   than the point would along the heading.
-- If the point would brake along the heading, the unicycle brakes just as hard, at once and without turning.
+- If the point would brake along the heading, the unicycle brakes just as hard at once: braking has priority
+  over turning.
 - There is no sideways slip, except in contact and under external forces. Under an external force, a unicycle
   moves as a point and keeps its heading. When the force ends, the wheels stop the sideways part of its
   velocity.

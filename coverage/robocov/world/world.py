@@ -406,7 +406,7 @@ class World:
     def _resolve_contacts(
         self, states: FloatArray, net_forces: FloatArray, max_speed: FloatArray, dt: float
     ) -> tuple[FloatArray, bool]:
-        """Return the states after contacts were resolved, and whether there are any contacts."""
+        """Return the states after resolving contacts, and whether there were any."""
         touching_by_run: dict[int, list[int]] = {}
         for robot in self._list_touching_robots():
             touching_by_run.setdefault(robot // self._team_size, []).append(robot)

@@ -559,9 +559,10 @@ def _has_changed(previous: PlannerState, state: PlannerState, radius: float) -> 
 
 
 def _extend_viewpoint_path(state: PlannerState, position: FloatArray, added_length: float) -> TraveledPath:
-    """Return the path after the last move, which counts toward a viewpoint if the robot headed for one.
+    """Return the path with the last move included in the statistics of viewpoints.
 
-    `added_length` is the length of this move, m.
+    If the robot was heading for a viewpoint, the length of the move, `added_length` in meters, is added to
+    the path length spent on viewpoints, and the viewpoint is recorded if the robot has reached it.
     """
     viewpoint = None if state.motion is None else state.motion.viewpoint
     if viewpoint is None:

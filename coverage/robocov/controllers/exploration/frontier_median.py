@@ -181,7 +181,7 @@ class FrontierMedian(SharedMapController):
         previous_plan = situation.previous_plan
         goals = situation.previous_goals
         if previous_plan is not None and previous_plan.placement.is_final and np.isfinite(goals).all():
-            first = candidates.find_nearest(goals)
+            first = candidates.assign_to_positions(goals)
             min_saving = self.threshold
         else:
             first = choose_greedily(candidates.table, count)

@@ -61,7 +61,7 @@ class GreedySubmodular(SharedMapController):
             return Placement(goals=situation.positions, is_final=False)
         chosen = run_lloyd(candidates.table, choose_greedily(candidates.table, count))
         if np.isfinite(situation.previous_goals).all():
-            previous = run_lloyd(candidates.table, candidates.find_nearest(situation.previous_goals))
+            previous = run_lloyd(candidates.table, candidates.assign_to_positions(situation.previous_goals))
             max_cost = (1.0 - self.threshold) * candidates.compute_cost(previous)
             if not candidates.compute_cost(chosen) < max_cost:
                 chosen = previous

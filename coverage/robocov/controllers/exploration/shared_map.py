@@ -169,17 +169,18 @@ class Candidates(NamedTuple):
         """Compute the coverage cost with a robot at each of the chosen candidates, (k,)."""
         return float(self.table[:, chosen].min(axis=1).sum())
 
-    def find_nearest(self, positions: FloatArray) -> IntArray:
+    def assign_to_positions(self, positions: FloatArray) -> IntArray:
         """Assign a different candidate to each position so that the sum of squared distances is minimal.
 
         Parameters
         ----------
         positions : (k, 2) array, m
+            At most as many as there are candidates.
 
         Returns
         -------
         (k,) int array
-            Indices of candidates.
+            Index of the candidate of each position.
         """
         squared_distances = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
         _, candidates = scipy.optimize.linear_sum_assignment(squared_distances)
@@ -208,7 +209,7 @@ class Candidates(NamedTuple):
         squared_distances = ((map_window.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
         is_close = map_window.has_clearance & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
         fine = Candidates.build_at_nodes(situation, weights, np.flatnonzero(is_close))
-        return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
+        return fine.positions[run_lloyd(fine.table, fine.assign_to_positions(positions))]
 
 
 def assign_goals(situation: Situation, goals: FloatArray) -> FloatArray:

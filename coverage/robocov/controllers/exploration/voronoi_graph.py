@@ -72,7 +72,7 @@ class VoronoiGraphCoverage(SharedMapController):
         if len(candidates.positions) < count:
             return Placement(goals=_assign_vertices(situation, candidates.positions), is_final=False)
         goals = situation.previous_goals
-        chosen = candidates.find_nearest(np.where(np.isfinite(goals), goals, situation.positions))
+        chosen = candidates.assign_to_positions(np.where(np.isfinite(goals), goals, situation.positions))
         is_fixed = np.zeros(count, dtype=bool)
         min_saving = self.threshold
         while True:
