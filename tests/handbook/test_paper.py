@@ -11,7 +11,10 @@ import pytest
 from markdown_pages import read_handbook_page
 
 from robocov_app.commands.handbook import find_page_sources
+from robocov_app.figures.statistics import adjust_p_values
+from robocov_app.replication.claims.claim import CriterionResult, derive_verdict
 from robocov_app.replication.claims.registration import load_registration
+from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS
 
 PAGE = read_handbook_page("paper")
 CLAIMS: dict[str, dict[str, Any]] = {
@@ -59,6 +62,38 @@ def test_the_study_is_the_registered_one() -> None:
     assert tuple(CLAIMS) == load_registration().claims
     assert min(claim["maps"] for claim in CLAIMS.values()) == 12  # of the grid of gains
     assert CLAIMS["nonconvex-final-shared"]["maps"] == 100
+
+
+def read_results(claim: dict[str, Any]) -> list[CriterionResult]:
+    """Return the results of the criteria of a claim."""
+    return [
+        CriterionResult(criterion["met"], criterion["p"], criterion["p_refutation"])
+        for criterion in claim["criteria"]
+    ]
+
+
+def test_verdicts_follow_from_the_results() -> None:
+    results = {key: read_results(claim) for key, claim in CLAIMS.items()}
+    p_values = {key: max(result.p_value for result in results[key]) for key in CLAIMS}
+    adjusted_p_values = adjust_p_values(p_values)
+    for key, claim in CLAIMS.items():
+        assert claim["maps"] >= MIN_MAPS
+        assert claim["p_adjusted"] == pytest.approx(adjusted_p_values[key])
+        assert claim["verdict"] == derive_verdict(results[key], claim["p_adjusted"], len(CLAIMS))
+
+
+def test_the_changed_verdicts_are_recorded() -> None:
+    """Before the change, a claim that meets all criteria was undecided if it was not significant."""
+    changed = [
+        key
+        for key, claim in CLAIMS.items()
+        if all(criterion["met"] for criterion in claim["criteria"])
+        and claim["p_adjusted"] > ALPHA
+        and claim["verdict"] != "undecided"
+    ]
+    (change,) = load_registration().changes
+    assert list(change.changed_claims) == changed
+    assert f"On {change.date}, when all results were known, one rule changed" in PAGE
 
 
 @pytest.mark.parametrize("key", ROWS)

@@ -1,13 +1,13 @@
 """Verdicts on the paper's claims from artificial outcomes, for which the right verdict is known."""
 
-from itertools import permutations
+from itertools import permutations, product
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.figures.statistics import Interval
+from robocov_app.figures.statistics import Interval, adjust_p_values
 from robocov_app.replication.claims import (
     Claim,
     Criterion,
@@ -15,6 +15,7 @@ from robocov_app.replication.claims import (
     summarize_verdicts,
     thresholds,
 )
+from robocov_app.replication.claims.claim import CriterionResult, derive_verdict
 from robocov_app.replication.claims.convex_claims import judge_convex_final, judge_convex_spreading
 from robocov_app.replication.claims.gain_claims import (
     compute_regrets,
@@ -78,6 +79,27 @@ def get_map_number(instance: ProblemInstance) -> int:
     return int(instance.map.split()[1])
 
 
+ORDERED_VERDICTS = ("does not hold", "undecided", "holds partly", "holds")
+"""From the worst to the best."""
+CRITERION_RESULTS = tuple(
+    CriterionResult(is_met, p_value, refutation_p_value)
+    for is_met, p_value, refutation_p_value in product(
+        (False, None, True), (0.3, 0.002, 0.0002), (0.0002, 0.3)
+    )
+)
+"""All combinations of refuted, open and met with some p-values. Each of the three gets better."""
+
+
+def is_at_least_as_good(first, second):
+    """Return whether the result of a criterion is at least as good as another one."""
+    order = (False, None, True)
+    return (
+        order.index(first.is_met) >= order.index(second.is_met)
+        and first.p_value <= second.p_value
+        and first.refutation_p_value >= second.refutation_p_value
+    )
+
+
 class TestVerdicts:
     @pytest.mark.parametrize(
         ("bounds", "interval", "met"),
@@ -120,7 +142,7 @@ class TestVerdicts:
             Criterion("x", Interval(0.5, 0.4, 0.6, np.array(samples)), high=1.0)
             for samples in ([0.5, 0.5, 0.5], [0.5, 2.0, 0.5])
         )
-        claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted_p_value=adjusted)
+        claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted_p_value=adjusted, family_size=2)
         assert (claim.verdict, claim.p_value) == (verdict, 0.5)
         assert claim.p_value_text == ("p = 0.5" if adjusted is None else f"p = 0.5, Holm-adjusted {adjusted}")
 
@@ -136,6 +158,33 @@ class TestVerdicts:
         for criteria, verdict in zip(((met, refuted), (refuted,)), verdicts, strict=True):
             claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted_p_value=1.0, family_size=family_size)
             assert claim.verdict == verdict
+
+    @pytest.mark.parametrize(
+        ("p_values", "verdict"), [((0.001, 0.01), "holds partly"), ((0.002, 0.01), "undecided")]
+    )
+    def test_a_claim_that_meets_all_criteria_may_hold_partly(self, p_values, verdict):
+        results = [CriterionResult(True, p_value, 1.0) for p_value in p_values]
+        assert derive_verdict(results, adjusted_p_value=0.06, family_size=40) == verdict
+        assert derive_verdict(results, adjusted_p_value=0.05, family_size=40) == "holds"
+
+    @pytest.mark.parametrize("family_size", [1, 2, 40])
+    def test_better_results_never_give_a_worse_verdict(self, family_size):
+        # Other claims with significant p-values come first in Holm's method, those with a p-value of 1 last.
+        other_p_values = {f"other {k}": 1e-5 if k < 25 else 1.0 for k in range(family_size - 1)}
+
+        def rank_verdict(*results):
+            p_values = {**other_p_values, "claim": max(result.p_value for result in results)}
+            adjusted_p_value = None if family_size == 1 else adjust_p_values(p_values)["claim"]
+            return ORDERED_VERDICTS.index(derive_verdict(results, adjusted_p_value, family_size))
+
+        ranks = {pair: rank_verdict(*pair) for pair in product(CRITERION_RESULTS, repeat=2)}
+        assert set(ranks.values()) == set(range(len(ORDERED_VERDICTS)))
+        for (first, second), rank in ranks.items():
+            for better in CRITERION_RESULTS:
+                if is_at_least_as_good(better, first):
+                    assert ranks[better, second] >= rank
+                if is_at_least_as_good(better, second):
+                    assert ranks[first, better] >= rank
 
     @pytest.fixture
     def paper_claims(self):

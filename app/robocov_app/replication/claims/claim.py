@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from robocov_app.figures.statistics import Interval, adjust_p_values
 from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS
@@ -28,6 +28,17 @@ GOALS = 8
 RIVALS = 9
 EXTENSIONS = 10
 """Numbers of the questions beyond the paper."""
+
+
+class CriterionResult(NamedTuple):
+    """Result of the test of a criterion."""
+
+    is_met: bool | None
+    """Whether the whole interval is in the range; None if only part of it is, or if it is unknown."""
+    p_value: float
+    """The p-value of the hypothesis that the true value is outside the range."""
+    refutation_p_value: float
+    """The p-value of the hypothesis that the true value is in the range."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +90,11 @@ class Criterion:
         return min([1.0, *(len(p_values) * p_value for p_value in p_values)])
 
     @property
+    def result(self) -> CriterionResult:
+        """The result of its test."""
+        return CriterionResult(self.is_met, self.p_value, self.refutation_p_value)
+
+    @property
     def range_text(self) -> str:
         """The range as text, for example "at most 5%"."""
         low = format_amount(self.low, self.unit)
@@ -105,6 +121,7 @@ class Criterion:
             "at_most": self.high,
             "met": self.is_met,
             "p": self.p_value,
+            "p_refutation": self.refutation_p_value,
         }
 
 
@@ -193,28 +210,11 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict: it holds if all criteria are met, and holds partly if some are.
-
-        It is undecided on too few maps, or if no criterion is met or refuted. If claims are tested together,
-        p-values are adjusted for their number: by Holm for a claim that holds, and by Bonferroni for
-        single criteria that are met or refuted.
-        """
-        if self.maps < self.min_maps or not self.criteria:
+        """The verdict by `derive_verdict`; it is undecided on too few maps."""
+        if self.maps < self.min_maps:
             return "undecided"
-        met = [criterion for criterion in self.criteria if criterion.is_met]
-        if len(met) == len(self.criteria):
-            is_significant = self.adjusted_p_value is None or self.adjusted_p_value <= ALPHA
-            return "holds" if is_significant else "undecided"
-        if any(self._is_significant(criterion.p_value) for criterion in met):
-            return "holds partly"
-        refuted = [criterion for criterion in self.criteria if criterion.is_met is False]
-        if not met and any(self._is_significant(criterion.refutation_p_value) for criterion in refuted):
-            return "does not hold"
-        return "undecided"
-
-    def _is_significant(self, p_value: float) -> bool:
-        """Return whether the p-value of a criterion is significant; True if the claim is tested alone."""
-        return self.family_size == 1 or self.family_size * p_value <= ALPHA
+        results = [criterion.result for criterion in self.criteria]
+        return derive_verdict(results, self.adjusted_p_value, self.family_size)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of the claim in ``claims.json``."""
@@ -236,6 +236,51 @@ class Claim:
             "explanation": self.explanation,
             "criteria": [criterion.to_json() for criterion in self.criteria],
         }
+
+
+def derive_verdict(
+    results: Sequence[CriterionResult], adjusted_p_value: float | None, family_size: int
+) -> Verdict:
+    """Derive the verdict on a claim from the results of its criteria.
+
+    Parameters
+    ----------
+    results : sequence of CriterionResult
+        One for each criterion.
+    adjusted_p_value : float or None
+        The p-value of the claim, adjusted by Holm; None if the claim is tested alone.
+    family_size : int
+        Number of claims that are tested together.
+
+    Returns
+    -------
+    Verdict
+        The first of these that applies:
+
+        - "holds" if all criteria are met, and the adjusted p-value is significant;
+        - "holds partly" if a criterion is met, and its p-value, adjusted by Bonferroni, is significant;
+        - "does not hold" if no criterion is met, and one is refuted with a p-value that is significant after
+          this adjustment;
+        - "undecided".
+
+    Notes
+    -----
+    The verdict is monotone: if one criterion is better met, with lower p-values, and all else is equal, the
+    verdict is the same or better, in the order "does not hold", "undecided", "holds partly", "holds".
+    """
+
+    def is_significant(p_value: float) -> bool:
+        return family_size == 1 or family_size * p_value <= ALPHA
+
+    met = [result for result in results if result.is_met]
+    refuted = [result for result in results if result.is_met is False]
+    if met and len(met) == len(results) and (adjusted_p_value is None or adjusted_p_value <= ALPHA):
+        return "holds"
+    if any(is_significant(result.p_value) for result in met):
+        return "holds partly"
+    if not met and any(is_significant(result.refutation_p_value) for result in refuted):
+        return "does not hold"
+    return "undecided"
 
 
 def adjust_claims(claims: Sequence[Claim]) -> list[Claim]:
