@@ -6,7 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from message_replay import (
+    extract_robot_decisions,
+    hide_undelivered,
+    record_run,
+    remove_messages,
+    replay,
+)
+from property_examples import count_examples
 
+from robocov.conditions import Conditions
+from robocov.controllers import make_controller
 from robocov.controllers.density_exchange import (
     MAX_SENT_MEASUREMENTS,
     MeasurementExchange,
@@ -15,12 +27,17 @@ from robocov.controllers.density_exchange import (
     ParameterExchange,
     add_received_measurements,
 )
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment
 from robocov.observation import Observations, ReceivedMessage
 from robocov.observation.neighbors import Neighbors
+from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.typing import FloatArray
 
-REGION = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10))).region
+SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
+REGION = SQUARE.region
+HOT = Gaussians((Gaussian((7.0, 6.0), weight=6.0, sigma=2.0),), floor=0.3)
 POSITIONS = np.array([[1.0, 1.0], [2.0, 1.0], [9.0, 9.0]])
 
 
@@ -130,3 +147,41 @@ def test_robots_keep_their_own_measurements() -> None:
     np.testing.assert_array_equal(added, [[1.0, np.nan, 8.0], [np.nan] * 3, [np.nan] * 3])
     assert np.isnan(measurements[0, 2])
     assert add_received_measurements(observe(), measurements) is measurements
+
+
+LEARNERS = {
+    "adaptive": {"period": 0.25},
+    "gp-ucb": {"period": 0.25},
+    # Without exploration, goals are centroids, which depend on all measurements.
+    "exploring-lloyd": {"period": 0.25, "squares": 10.0, "exploration": 1.0},
+}
+"""Gains of controllers whose robots learn a density together, so that they plan often."""
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+@settings(max_examples=count_examples(12), phases=[Phase.generate])
+@given(seed=st.integers(0, 2**32 - 1), robot=st.integers(0, 3))
+def test_robots_learn_a_density_from_delivered_messages_only(name: str, seed: int, robot: int) -> None:
+    """A robot decides the same, bit for bit, if all that it does not receive is replaced.
+
+    It decides differently if it receives neither measurements nor parameters.
+    """
+    starts = SQUARE.start().sample(4, seed=seed % 2**16, radius=0.1)
+    conditions = Conditions(
+        density="sensed", loss=0.3, delay=0.2, message_rate=4.0, bandwidth=4000.0, seed=seed
+    )
+    simulation = Simulation(
+        SQUARE.with_density(HOT),
+        make_controller(name, LEARNERS[name]),
+        starts,
+        Team.homogeneous(4, sensing_range=1.5, communication_range=15.0),
+        dt=0.05,
+        conditions=conditions,
+    )
+    observations, decisions = record_run(simulation, 50)
+    decided = extract_robot_decisions(decisions, robot)
+    received = hide_undelivered(observations, robot, seed)
+    assert extract_robot_decisions(replay(simulation, received), robot) == decided
+    silent = remove_messages(received, (Measurements, np.ndarray), HOT)
+    goals = [goal for _, goal, _ in extract_robot_decisions(replay(simulation, silent), robot)]
+    assert goals != [goal for _, goal, _ in decided]

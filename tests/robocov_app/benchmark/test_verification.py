@@ -204,12 +204,21 @@ def test_robots_of_the_learned_controller_decide_by_their_own_observations(track
     assert isolate(LEARNED, track, [2]) == []
 
 
-SHARING = [name for name, kind in CONTROLLERS.items() if kind.information == "shared map"]
+QUICK_SHARED_RUN = ("greedy-submodular", "lossy")
+SHARED_RUNS = [
+    pytest.param(
+        name,
+        track,
+        id=f"{name}-{track}",
+        marks=[] if (name, track) == QUICK_SHARED_RUN else [pytest.mark.slow],
+    )
+    for name, kind in CONTROLLERS.items()
+    for track in TRACKS
+    if kind.information == "shared map"
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("track", TRACKS)
-@pytest.mark.parametrize("controller", SHARING)
+@pytest.mark.parametrize(("controller", "track"), SHARED_RUNS)
 def test_robots_that_share_maps_decide_by_their_own_observations(
     controller: str, track: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -219,7 +228,8 @@ def test_robots_that_share_maps_decide_by_their_own_observations(
     snapshots: list[Snapshot] = []
     outcome, team, _ = run_isolated(build_task(controller, track), [2, 3], snapshots)
     assert outcome.error is None
-    # Robots of gp-ucb have nothing to send if they know that the density is the same everywhere.
+    # Robots of gp-ucb have nothing to send if they know that the density is the same everywhere. The test of
+    # robots that learn a density from delivered messages only is about their messages.
     assert any(any(snapshot.seen.messages) for snapshot in snapshots) == (controller != "gp-ucb")
     assert team.differences == []
     # Compressed payloads contain names of classes, which outweigh the few measurements of the first seconds.

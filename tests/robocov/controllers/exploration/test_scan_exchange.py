@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from message_replay import extract_robot_decisions, hide_undelivered, record_run, replay
 from property_examples import count_examples
 
 from robocov.conditions import Conditions
@@ -15,12 +14,10 @@ from robocov.controllers import CONTROLLERS, make_controller
 from robocov.controllers.exploration.scan_exchange import MAX_REPAIRS, Digest, ScanExchange, _count_sendable
 from robocov.controllers.exploration.teammates import TeammateReport
 from robocov.environment import Environment, WallObstacle
-from robocov.observation import Message, Observations
+from robocov.observation import Message
 from robocov.planning.scan_log import NumberedScan
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov_app.benchmark.verification.controller_messages import encode_payload
-from robocov_app.benchmark.verification.isolation import hide_others, sample_substitutes
 
 ROOMS = Environment(
     "two rooms",
@@ -193,19 +190,6 @@ def test_a_single_robot_sends_nothing(name: str) -> None:
     assert len(list_scans(simulation.memory.exchange, 0)) == 3
 
 
-def replay(simulation: Simulation, observations: list[Observations]) -> list[Any]:
-    """Return the decisions of a controller from the start for given observations."""
-    controller = simulation.controller
-    memory = controller.begin(observations[0].region, simulation.team)
-    decisions = []
-    for seen in observations:
-        decision = controller.decide(seen, memory)
-        memory = decision.memory
-        decisions.append(decision)
-    return decisions
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=count_examples(3), phases=[Phase.generate])
 @given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.0, 0.3, 0.8]), robot=st.integers(0, 3))
@@ -213,24 +197,9 @@ def test_undelivered_messages_change_no_decision(name: str, seed: int, loss: flo
     """A robot decides the same, bit for bit, if all that it does not receive is replaced."""
     conditions = Conditions(loss=loss, delay=0.2, message_rate=4.0, bandwidth=4000.0, seed=seed)
     simulation = build_simulation(name, conditions, communication_range=3.0)
-    observations = []
-    decisions = []
-    for _ in range(70):
-        snapshot = simulation.observe_and_decide()
-        observations.append(snapshot.seen)
-        decisions.append(snapshot.decision)
-        simulation.step()
-    substitutes = sample_substitutes(ROOMS.region, len(CORNER), np.random.default_rng(seed))
-    hidden = [hide_others(seen, robot, substitutes) for seen in observations]
-    for decision, repeated in zip(decisions, replay(simulation, hidden), strict=True):
-        assert decision.forces[robot].tobytes() == repeated.forces[robot].tobytes()
-        assert decision.goals[robot].tobytes() == repeated.goals[robot].tobytes()
-        own_messages = [list(each.messages[robot]) if each.messages else [] for each in (decision, repeated)]
-        first, second = (
-            [(message.size, encode_payload(message.payload)) for message in messages]
-            for messages in own_messages
-        )
-        assert first == second
+    observations, decisions = record_run(simulation, 70)
+    repeated = replay(simulation, hide_undelivered(observations, robot, seed))
+    assert extract_robot_decisions(repeated, robot) == extract_robot_decisions(decisions, robot)
 
 
 @pytest.mark.slow
