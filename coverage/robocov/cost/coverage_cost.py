@@ -42,8 +42,9 @@ class CoverageCost:
     has a density φ, each site is weighted by the exact mean of φ over its cell.
 
     The paths are those of a point, except that no path leads through a gap that is narrower than a robot. The
-    area behind such a gap counts as uncovered. The path of a disc is longer than that of a point, but at each
-    turn by less than the radius times the angle of the turn.
+    area behind such a gap counts as uncovered. Between positions that the center of a disc can reach, the
+    shortest path of the disc that passes all obstacles on the same sides is longer than that of the point by
+    at most the radius times the total angle, in radians, by which the path of the disc turns.
 
     Parameters
     ----------
