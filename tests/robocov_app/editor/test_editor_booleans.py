@@ -10,12 +10,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
-from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
+from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties
 from robocov_app.editor.model.geometry import extract_polygons
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Item, Sketch
+
+
+BOW_TIE = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
+PATH = ObstaclePath(((2.0, 2.0), (8.0, 2.0)), 0.5, "back-and-forth")
 
 
 def unite_shapes(sketch: Sketch) -> shapely.Geometry:
@@ -199,10 +203,9 @@ def test_obstacles_are_clipped_to_the_boundary():
 
 
 def test_crossing_outlines_are_repaired():
-    bow_tie = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
     sketch = Sketch("n", boundary=((0.0, 0.0), (8.0, 8.0), (8.0, 0.0), (0.0, 8.0), (0.0, 7.0)))
     sketch, keys = sketch.with_obstacles(
-        [PolygonObstacle(bow_tie, (), "tie"), CircleObstacle((6.0, 4.0), 0.5)]
+        [PolygonObstacle(BOW_TIE, (), "tie"), CircleObstacle((6.0, 4.0), 0.5)]
     )
     change = boolean.repair_outlines(sketch, Selection())
     assert change.description == "2 outlines repaired"
@@ -215,6 +218,57 @@ def test_crossing_outlines_are_repaired():
     # Only selected obstacles are repaired.
     only = boolean.repair_outlines(sketch, Selection.of(keys[0]))
     assert only.sketch.boundary == sketch.boundary
+    # The other outlines may still cross themselves.
+    with pytest.raises(MapError, match="nothing to repair: no selected outline crosses itself"):
+        boolean.repair_outlines(sketch, Selection.of(keys[1]))
+
+
+@pytest.mark.parametrize(
+    ("boundary", "outlines", "message"),
+    [
+        (HALL, [((7.0, 7.0), (8.0, 8.0))], "1 outline without an area removed"),
+        (HALL, [BOW_TIE, ((7.0, 7.0), (8.0, 8.0))], "1 outline repaired, 1 without an area removed"),
+        (((0.0, 0.0), (10.0, 0.0), (5.0, 0.0)), [], "1 outline without an area removed"),
+    ],
+)
+def test_a_repair_reports_outlines_that_it_removes(boundary, outlines, message):
+    shapes = [PolygonObstacle(outline) for outline in outlines]
+    sketch, _ = Sketch("n", boundary=boundary).with_obstacles(shapes)
+    assert boolean.repair_outlines(sketch, Selection()).description == message
+
+
+@pytest.mark.parametrize(
+    ("edit", "count"),
+    [
+        (boolean.repair_outlines, 2),
+        (lambda sketch, selection: boolean.offset(sketch, selection, 0.1), 1),
+        (boolean.clip_to_boundary, 2),
+    ],
+)
+def test_moving_obstacles_keep_their_paths(edit, count):
+    boundary = ((1.5, 0.0), (10.0, 0.0), (10.0, 10.0), (1.5, 10.0))
+    cart = PolygonObstacle(BOW_TIE, (), "cart", PATH)
+    sketch, (key,) = Sketch("n", boundary=boundary).with_obstacles([cart])
+    change = edit(sketch, Selection.of(key))
+    assert [item.shape.path for item in change.sketch.obstacles] == [PATH] * count
+
+
+@pytest.mark.parametrize("name", ["unite", "subtract", "intersect", "divide"])
+def test_the_result_keeps_the_path_of_the_lowest_obstacle(name):
+    shapes = [replace(build_box(0.0, 0.0, 2.0, 2.0), path=PATH), build_box(1.0, 1.0, 2.0, 2.0)]
+    sketch, keys = Sketch().with_obstacles(shapes)
+    change = getattr(boolean, name)(sketch, Selection.of(*keys))
+    assert {item.shape.path for item in change.sketch.obstacles} == {PATH}
+    assert "path" not in change.description
+
+
+@pytest.mark.parametrize(("name", "verb"), [("unite", "united"), ("intersect", "intersected")])
+def test_lost_paths_are_reported(name, verb):
+    shapes = [build_box(0.0, 0.0, 2.0, 2.0), replace(build_box(1.0, 1.0, 2.0, 2.0), path=PATH)]
+    sketch, keys = Sketch().with_obstacles(shapes)
+    change = getattr(boolean, name)(sketch, Selection.of(*keys))
+    assert [item.shape.path for item in change.sketch.obstacles] == [None]
+    assert change.description == f"2 obstacles {verb}, 1 path removed"
 
 
 @given(valid_sketches(min_size=1))

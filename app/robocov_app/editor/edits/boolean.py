@@ -1,4 +1,7 @@
-"""Edits that combine obstacles. The result keeps the stacking position, name and note of the lowest one."""
+"""Edits that combine obstacles.
+
+The result keeps the stacking position, name, note and path of the lowest one.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +25,7 @@ _intersection = partial(shapely.intersection, grid_size=GRID_M)
 def unite(sketch: Sketch, selection: Selection) -> Change:
     """Unite the selected obstacles."""
     items = _require_solid_items(sketch, selection, "unite")
-    description = f"{format_count(len(items), 'obstacle')} united"
+    description = f"{format_count(len(items), 'obstacle')} united{_describe_lost_paths(items)}"
     return _replace_items(sketch, items, [_unite_geometries(items)], description)
 
 
@@ -41,7 +44,7 @@ def intersect(sketch: Sketch, selection: Selection) -> Change:
     """Replace the selected obstacles by their common area."""
     items = _require_solid_items(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
-    description = f"{format_count(len(items), 'obstacle')} intersected"
+    description = f"{format_count(len(items), 'obstacle')} intersected{_describe_lost_paths(items)}"
     return _replace_items(sketch, items, [common], description, "they have nothing in common")
 
 
@@ -76,7 +79,7 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
             return []
         return [replace(item.shape, radius=radius)]
     grown = item.geometry.buffer(distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
-    return extract_polygons(grown, item.shape.name)
+    return extract_polygons(grown, item.shape.name, item.shape.path)
 
 
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
@@ -91,7 +94,8 @@ def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in items:
         if not inside.covers(item.geometry):
-            shapes[item.key] = extract_polygons(_intersection(item.geometry, inside), item.shape.name)
+            remainder = _intersection(item.geometry, inside)
+            shapes[item.key] = extract_polygons(remainder, item.shape.name, item.shape.path)
     require(shapes, "nothing sticks out of the boundary")
     description = f"{format_count(len(shapes), 'obstacle')} cut off at the boundary"
     return replace_obstacles(sketch, shapes, description)
@@ -100,22 +104,35 @@ def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
 def repair_outlines(sketch: Sketch, selection: Selection) -> Change:
     """Repair self-intersecting outlines: the selected ones, or all if none are selected.
 
-    An obstacle may become several obstacles. Only the largest part of a boundary is kept.
+    An obstacle may become several obstacles. Only the largest part of a boundary is kept. Outlines without an
+    area are removed.
     """
     is_all = not selection.items and not selection.boundary
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in sketch.obstacles:
         if (is_all or item.key in selection.items) and _is_broken(item.shape):
-            shapes[item.key] = extract_polygons(item.geometry, item.shape.name)
+            shapes[item.key] = extract_polygons(item.geometry, item.shape.name, item.shape.path)
     boundary = sketch.boundary
     if is_all or selection.boundary:
         boundary = _repair_boundary(sketch)
-    is_boundary_repaired = boundary is not sketch.boundary
-    require(shapes or is_boundary_repaired, "there is nothing to repair: no outline crosses itself")
-    description = f"{format_count(len(shapes) + is_boundary_repaired, 'outline')} repaired"
+    is_boundary_changed = boundary is not sketch.boundary
+    outlines = "no outline" if is_all else "no selected outline"
+    require(shapes or is_boundary_changed, f"there is nothing to repair: {outlines} crosses itself")
+    is_boundary_repaired = is_boundary_changed and boundary is not None
+    repaired_count = sum(map(bool, shapes.values())) + is_boundary_repaired
+    removed_count = len(shapes) + is_boundary_changed - repaired_count
+    description = _describe_repairs(repaired_count, removed_count)
     change = replace_obstacles(replace(sketch, boundary=boundary), shapes, description)
-    is_boundary_selected = is_boundary_repaired and boundary is not None
-    return replace(change, selection=replace(change.selection, boundary=is_boundary_selected))
+    return replace(change, selection=replace(change.selection, boundary=is_boundary_repaired))
+
+
+def _describe_repairs(repaired_count: int, removed_count: int) -> str:
+    """Return the status message about outlines that were repaired, or removed because they had no area."""
+    if removed_count == 0:
+        return f"{format_count(repaired_count, 'outline')} repaired"
+    if repaired_count == 0:
+        return f"{format_count(removed_count, 'outline')} without an area removed"
+    return f"{format_count(repaired_count, 'outline')} repaired, {removed_count} without an area removed"
 
 
 def _is_broken(shape: Obstacle) -> bool:
@@ -126,7 +143,10 @@ def _is_broken(shape: Obstacle) -> bool:
 
 
 def _repair_boundary(sketch: Sketch) -> tuple[tuple[float, float], ...] | None:
-    """Return the largest part of a self-intersecting boundary, or the boundary itself if it is valid."""
+    """Return the largest part of a self-intersecting boundary, or the boundary itself if it is valid.
+
+    Return None if it has no area.
+    """
     boundary = sketch.boundary
     if boundary is None or len(boundary) < 3 or shapely.Polygon(boundary).is_valid:
         return boundary
@@ -138,6 +158,15 @@ def _repair_boundary(sketch: Sketch) -> tuple[tuple[float, float], ...] | None:
 
 def _unite_geometries(items: Sequence[Item]) -> shapely.Geometry:
     return shapely.union_all([item.geometry for item in items], grid_size=GRID_M)
+
+
+def _describe_lost_paths(items: Sequence[Item]) -> str:
+    """Return the end of a status message about the paths of obstacles that differ from that of the lowest."""
+    kept_path = items[0].shape.path
+    lost_count = sum(item.shape.path not in (None, kept_path) for item in items)
+    if lost_count == 0:
+        return ""
+    return f", {format_count(lost_count, 'path')} removed"
 
 
 def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
@@ -164,7 +193,7 @@ def _replace_items(
     lowest = items[0]
     polygons: list[Obstacle] = []
     for part in parts:
-        polygons += extract_polygons(part, lowest.shape.name)
+        polygons += extract_polygons(part, lowest.shape.name, lowest.shape.path)
     require(polygons, error)
     shapes: dict[int, Sequence[Obstacle]] = {item.key: () for item in items}
     shapes[lowest.key] = polygons

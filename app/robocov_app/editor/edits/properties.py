@@ -1,5 +1,6 @@
 """Edits of properties: delete, rename, annotate, resize, restack, group, lock, hide or convert objects."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import count
 from typing import Any, Literal
@@ -178,14 +179,14 @@ def make_default_start(sketch: Sketch, name: str) -> Change:
 
 def convert_to_polygons(sketch: Sketch, selection: Selection) -> Change:
     """Turn the selected circles and walls into polygons."""
-    shapes: dict[int, list[Obstacle]] = {}
+    shapes: dict[int, Sequence[Obstacle]] = {}
     for item in selection.list_items(sketch):
         if isinstance(item.shape, PolygonObstacle):
             continue
-        polygons = extract_polygons(item.geometry, item.shape.name)
+        polygons = extract_polygons(item.geometry, item.shape.name, item.shape.path)
         name = format_numbered_name(sketch, item.key)
         require(polygons, f"{name} has no area and cannot become a polygon")
-        shapes[item.key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
+        shapes[item.key] = polygons
     require(shapes, "select circles or walls first")
     description = f"{Selection.of(*shapes).describe(sketch)} turned into polygons"
     change = replace_obstacles(sketch, shapes, description)

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.environment import Point, PolygonObstacle, Ring
+from robocov.environment import ObstaclePath, Point, PolygonObstacle, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov.typing import FloatArray
 from robocov_app.editor.model import require
@@ -90,8 +90,10 @@ def enclose_boxes(boxes: Iterable[Box]) -> Box:
     return min(low_x), min(low_y), max(high_x), max(high_y)
 
 
-def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
-    """Convert the polygons of a geometry to obstacles with a name, the largest first.
+def extract_polygons(
+    geometry: shapely.Geometry, name: str | None = None, path: ObstaclePath | None = None
+) -> tuple[PolygonObstacle, ...]:
+    """Convert the polygons of a geometry to obstacles with a name and a path, the largest first.
 
     Coordinates are rounded to tenths of a millimeter. Tiny polygons and holes are dropped.
     """
@@ -102,7 +104,7 @@ def extract_polygons(geometry: shapely.Geometry, name: str | None = None) -> tup
     for part in map(shapely.orient_polygons, parts):
         rings = [part.exterior, *(hole for hole in part.interiors if not _is_tiny(hole))]
         outline, *holes = [tuple(map(round_point, ring.coords[:-1])) for ring in rings]
-        polygons.append(PolygonObstacle(outline, tuple(holes), name))
+        polygons.append(PolygonObstacle(outline, tuple(holes), name, path))
     return tuple(polygons)
 
 
