@@ -149,6 +149,43 @@ def test_data_without_bounds_gets_a_rectangle(tmp_path: Path) -> None:
     assert free.area == pytest.approx(24 * 24 - 50, abs=0.1)
 
 
+def test_the_bounds_of_single_elements_are_not_those_of_the_extract(tmp_path: Path) -> None:
+    """Overpass writes bounds into each way and relation for ``out bb`` and ``out geom``."""
+    extract = Extract()
+    extract.way(list_corners(35, 0, 10), building="yes")
+    sides = "minlat='50.7' minlon='6.1' maxlat='50.71' maxlon='6.11'"
+    extract.ways[0] = extract.ways[0].replace("<nd", f"<bounds {sides}/><nd", 1)
+    assert read_solid_area(tmp_path, extract).area == pytest.approx(50, abs=0.05)
+
+
+def test_ways_and_relations_may_contain_the_positions_of_their_nodes(tmp_path: Path) -> None:
+    """Overpass writes them for ``out geom``: with ids in ways, without ids in relations."""
+
+    def format_line(points: list[tuple[float, float]], ids: list[int | None]) -> str:
+        nodes = ""
+        for (x, y), node_id in zip(points, ids, strict=True):
+            longitude, latitude = PLANE(x, y, inverse=True)
+            ref = "" if node_id is None else f'ref="{node_id}" '
+            nodes += f'<nd {ref}lat="{latitude:.9f}" lon="{longitude:.9f}"/>'
+        return nodes
+
+    extract = Extract()
+    house = list_corners(-30, -20, 5)
+    way = format_line(house, [1, 2, 3, 4])
+    extract.ways.append(f'<way id="5">{way}<nd ref="1"/><tag k="building" v="yes"/></way>')
+    members = ""
+    for number, (corners, role) in enumerate(
+        [(list_corners(0, 0, 20), "outer"), (list_corners(5, 5, 10), "inner")], start=6
+    ):
+        line = format_line([*corners, corners[0]], [None] * 5)
+        members += f'<member type="way" ref="{number}" role="{role}">{line}</member>'
+    tags = format_tags({"type": "multipolygon", "building": "yes"})
+    extract.ways.append(f'<relation id="8">{members}{tags}</relation>')
+    found = read_solid_area(tmp_path, extract)
+    expected = shapely.union_all([box(-30, -20, -25, -15), box(0, 0, 20, 20) - box(5, 5, 15, 15)])
+    assert found.symmetric_difference(expected).area < 0.1
+
+
 def build_crowded_extract() -> str:
     """Return 3,000 relations of one way of 3,000 nodes."""
     extract = Extract()

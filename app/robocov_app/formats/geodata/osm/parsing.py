@@ -1,8 +1,9 @@
 """Reading the data of OpenStreetMap from XML or from the JSON of Overpass.
 
-XML is written by openstreetmap.org, JOSM and osmium: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is
-what Overpass returns for ``[out:json]``, with or without ``out geom``, and the file ``map.json`` of the API:
-https://wiki.openstreetmap.org/wiki/OSM_JSON.
+XML is written by openstreetmap.org, JOSM, osmium and Overpass: https://wiki.openstreetmap.org/wiki/OSM_XML.
+JSON is what Overpass returns for ``[out:json]``, and the file ``map.json`` of the API:
+https://wiki.openstreetmap.org/wiki/OSM_JSON. With ``out geom``, Overpass adds the positions of nodes to ways and
+relations in both formats.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ class _XmlReader:
         files.require_vertices(content.count(b"<nd"), source_name)
         files.require_vertices(content.count(b"<tag") // 2, source_name)
         self.element: OsmElement | None = None
+        self.member_id: int | None = None  # of the current member of a relation, if it is a way
+        self.member_line: list[tuple[float, float] | None] = []
         self.depth = 0
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start_element
@@ -87,14 +90,20 @@ class _XmlReader:
 
         Raise KeyError for a missing attribute, and ValueError for an invalid one.
         """
-        if name == "bounds":
+        if name == "bounds" and self.depth == 2:  # deeper ones are those of single ways and relations
             self.data.bounds.append(_parse_bounds(attributes))
         elif self.depth == 2 and name in ("node", "way", "relation"):
             self._add_osm_element(name, attributes)
         elif self.element is None:
             return
-        elif name == "nd" or (name == "member" and attributes["type"] == "way"):
-            self.element.members.append(int(attributes["ref"]))
+        elif name == "nd" and self.depth == 3:
+            self._add_way_node(int(attributes["ref"]), _parse_position(attributes))
+        elif name == "nd":
+            self.member_line.append(_parse_position(attributes))
+        elif name == "member" and attributes["type"] == "way":
+            self.member_id = int(attributes["ref"])
+            self.member_line = []
+            self.element.members.append(self.member_id)
         elif name == "tag" and attributes["k"] in USED_TAGS:
             self.element.tags[attributes["k"]] = attributes["v"]
 
@@ -109,8 +118,26 @@ class _XmlReader:
             latitude = _parse_degrees(attributes, "lat")
             self.data.add_node(number, longitude, latitude)
 
+    def _add_way_node(self, number: int, position: tuple[float, float] | None) -> None:
+        """Add a node to the current way, and its position if the way contains it (``out geom``)."""
+        assert self.element is not None
+        self.element.members.append(number)
+        if position is not None and not self.data.has_node(number):
+            longitude, latitude = position
+            self.data.add_node(number, longitude, latitude)
+
+    def _end_member(self) -> None:
+        """Add the way of a relation that contains the positions of its nodes (``out geom``)."""
+        number = self.member_id
+        self.member_id = None
+        if number is not None and self.member_line and number not in self.data.ways:
+            members = self.data.add_line(self.member_line)
+            self.data.add_element(OsmElement("way", number, members=members))
+
     def _end_element(self, name: str) -> None:
         self.depth -= 1
+        if name == "member":
+            self._end_member()
         if self.depth == 1 and self.element is not None:
             self.data.add_element(self.element)
             self.element = None
@@ -230,6 +257,13 @@ def _parse_json_line(file: JsonFile, value: Any, location: JsonPath) -> list[tup
     for k, point in enumerate(value):
         line.append(None if point is None else _parse_json_point(file, point, (*location, k)))
     return line
+
+
+def _parse_position(attributes: Mapping[str, str]) -> tuple[float, float] | None:
+    """Return the longitude and latitude of a node of a way, or None if it is given without them."""
+    if "lat" not in attributes and "lon" not in attributes:
+        return None
+    return _parse_degrees(attributes, "lon"), _parse_degrees(attributes, "lat")
 
 
 def _parse_bounds(value: Mapping[str, Any]) -> tuple[float, float, float, float]:
