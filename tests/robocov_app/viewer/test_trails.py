@@ -56,6 +56,13 @@ def test_a_row_replaces_one_of_the_same_time():
     for move in range(100):
         trail.add(ROW_INTERVAL_S, np.full((1, 2), 100.0 + move), always=True)
     assert trail.positions[:, 0, 0].tolist() == [0.0, 199.0]
+    assert trail.get_starts(ROW_INTERVAL_S, [1]).tolist() == [[0.0, 0.0]]
+
+
+def test_a_row_that_replaces_the_first_one_replaces_the_start():
+    trail = build_trail(1)
+    trail.add(0.0, np.array([[5.0, 6.0]]), always=True)
+    assert trail.get_starts(0.0, [1]).tolist() == [[5.0, 6.0]]
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 0.2), st.booleans()), max_size=300), st.integers(8, 64))
@@ -119,6 +126,28 @@ def test_the_rebuilt_trail_is_that_of_the_run():
         np.testing.assert_array_equal(trail.positions, pane.trail.positions)
         assert trail.times == pytest.approx(pane.trail.times)
         np.testing.assert_array_equal(trail.get_starts(1.0, pane.numbers), pane.starts)
+
+
+def test_a_robot_that_is_placed_before_the_first_step_starts_there():
+    session = start_session(robots=3)
+    session.place_robot(1, (3.5, 3.0))
+    advance_session(session, 30)
+    pane = session.timeline.panes[0]
+    rebuilt = rebuild_trail(session.timeline.history, pane.number)
+    for starts in (pane.starts, rebuilt.get_starts(pane.time, pane.numbers)):
+        assert starts[0].tolist() == [3.5, 3.0]
+        np.testing.assert_array_equal(starts, pane.trail.positions[0])
+
+
+def test_a_robot_that_is_placed_in_the_step_in_which_it_joins_starts_there():
+    session = advance_session(start_session(robots=2), 10)
+    number = session.add_robot((3.5, 3.0))
+    session.place_robot(number, (1.0, 3.0))
+    advance_session(session, 10)
+    pane = session.timeline.panes[0]
+    starts = dict(zip(pane.numbers, pane.starts.tolist(), strict=True))
+    assert starts[number] == [1.0, 3.0]
+    assert starts[1] == pane.trail.positions[0, 0].tolist()
 
 
 def test_robots_have_no_positions_before_they_join_and_after_they_fail():

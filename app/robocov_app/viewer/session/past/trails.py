@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -111,12 +112,12 @@ class Trail:
         positions : (m, 2) array, m
             Positions of the robots in the first m columns. The others do not work.
         always : bool
-            Whether to append the positions even if the last row is recent; one of the same time is replaced.
+            Whether to append the positions even if the last row is recent; a row with the same time is
+            replaced.
         """
         elapsed = time - self.last_time
         if elapsed < _SAME_TIME_S and always:
-            self._count -= 1
-            self._section_start = min(self._section_start, self._count)
+            self._remove_last_row()
         elif elapsed < _MIN_ROW_INTERVAL_S and not always:
             return
         if self._count == len(self._times):
@@ -202,6 +203,15 @@ class Trail:
             for first in range(0, len(later.times), chunk_rows):
                 rows = slice(first, first + chunk_rows)
                 self._append_rows(later.positions[rows], later.times[rows])
+
+    def _remove_last_row(self) -> None:
+        """Remove the last row, and the starts of robots that are in no other row."""
+        self._count -= 1
+        self._section_start = min(self._section_start, self._count)
+        is_absent = np.isnan(self.positions[..., 0]).all(axis=0)
+        for number in compress(self.numbers, is_absent):
+            self._starts.pop(number, None)
+        self._start_arrays = {}
 
     def _append_rows(self, positions: FloatArray, times: FloatArray) -> None:
         while self._count + len(times) > len(self._times):
