@@ -362,6 +362,6 @@ def export_map(
         dropped.append(f"the density ({environment.density.kind})")
     if environment.has_moving_obstacles:
         count = sum(shape.path is not None for shape in environment.obstacles)
-        paths = format_count(count, "path")
-        dropped.append(f"the {paths} of moving obstacles, which are written at their positions at time 0")
+        position = "its position" if count == 1 else "their positions"
+        dropped.append(f"motion of {format_count(count, 'obstacle')} (written at {position} at 0 s)")
     return replace(report, dropped=tuple(dropped))

@@ -93,17 +93,17 @@ def shorten_text(text: str, measure: Callable[[str], float], width: float, *, mi
     Returns
     -------
     str
-        The whole text if it fits; an empty text if not even one character fits.
+        The whole text if it fits; an empty text if no character fits and `min_chars` is 0.
 
     Examples
     --------
     >>> shorten_text("Lloyd's algorithm", len, 8)
     "Lloyd's…"
     """
-    if measure(text) <= width:
+    if min_chars >= len(text) or measure(text) <= width:
         return text
     # Bisection: `fitting` characters fit, `too_long` do not.
-    fitting = min(min_chars, len(text))
+    fitting = min_chars
     too_long = len(text) + 1
     while too_long - fitting > 1:
         middle = (fitting + too_long) // 2

@@ -163,7 +163,7 @@ def read_saved(path: Path) -> tuple[str, bytes]:
             members = [path]
         if sum(member.stat().st_size for member in members) > MAX_DOWNLOAD_BYTES:
             limit = f"{MAX_DOWNLOAD_BYTES >> 20} MB"
-            raise TransferError(f"{path.name}: larger than {limit}; copy it from the folder of the server")
+            raise TransferError(f"{path.name}: larger than {limit}; copy it directly from the server's folder")
         if path.is_dir():
             return f"{path.name}.zip", _zip_files(members, path.parent)
         return path.name, path.read_bytes()
@@ -174,7 +174,7 @@ def read_saved(path: Path) -> tuple[str, bytes]:
 def _zip_files(members: list[Path], root: Path) -> bytes:
     """Return a zip archive of files with their paths relative to a root folder."""
     archive = BytesIO()
-    with ZipFile(archive, "w", ZIP_DEFLATED) as target:
+    with ZipFile(archive, "w", ZIP_DEFLATED, strict_timestamps=False) as target:
         for path in members:
             target.write(path, path.relative_to(root))
     return archive.getvalue()

@@ -22,6 +22,7 @@ from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.map_draft import find_recoverable
+from robocov_app.editor.ui.file_commands import set_background_file
 from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.launch import EditorLauncher, offer_recovery
 from robocov_app.editor.ui.typed_commands import run_typed_command
@@ -180,6 +181,23 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_p
     assert "no longer exists" in driver.message
 
 
+def test_a_background_that_cannot_be_read_is_reported(driver: EditorDriver, tmp_path: Path) -> None:
+    def open_background(path: Path) -> str:
+        with pytest.raises(MapError) as caught:
+            set_background_file(driver.editor, path)
+        return str(caught.value)
+
+    path = tmp_path / "plan.png"
+    assert open_background(path) == f"{path}: cannot be read: No such file or directory"
+    path.write_text("not an image")
+    assert open_background(path) == f"{path}: cannot be read as an image"
+    Image.new("RGB", (400, 200)).save(path)
+    path.write_bytes(path.read_bytes()[:30])
+    assert open_background(path) == f"{path}: cannot be read as an image"
+    assert open_background(tmp_path).startswith(f"{tmp_path}: cannot be read: ")
+    assert driver.sketch.background is None
+
+
 def test_the_path_of_a_picture_is_relative_to_the_map(driver: EditorDriver, tmp_path: Path) -> None:
     Image.new("RGB", (400, 200)).save(tmp_path / "plan.png")
     driver.press_key("ctrl+s")
@@ -192,7 +210,7 @@ def test_the_path_of_a_picture_is_relative_to_the_map(driver: EditorDriver, tmp_
     driver.press_key("ctrl+b")
     driver.type("no.png")
     driver.press_key("return")
-    assert "not an image" in driver.read_dialog_error()
+    assert "cannot be read as an image" in driver.read_dialog_error()
     driver.window.run_command("background:none")
     assert driver.sketch.background is None
     driver.editor.apply(set_background(driver.sketch, Background("gone.png", (40, 30))))

@@ -98,8 +98,14 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             build_hall(boundary=((0.0, 0.0), (2e4, 0.0), (0.0, 5.0))),
-            "boundary: it is 20000 × 5 m large: it must not exceed 10 km",
+            "boundary: it measures 20000 × 5 m: neither side may exceed 10 km",
             (1e4, 2.5),
+            BOUNDARY,
+        ),
+        (
+            build_hall(boundary=((0.0, 0.0), (123456.0, 0.0), (0.0, 5.0))),
+            "boundary: it measures 123456 × 5 m: neither side may exceed 10 km",
+            (61728.0, 2.5),
             BOUNDARY,
         ),
         (

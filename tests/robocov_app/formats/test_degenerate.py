@@ -49,7 +49,7 @@ CASES: list[tuple[str, str, str]] = [
     ("json", build_overpass(building="yes"), NONE),
     ("json", "[[[1, 1], [1, 1], [1, 1]]]", NONE),
     ("json", '{"vertices": [1, 1, 1, 1, 1, 1]}', NONE),
-    ("json", '{"verts": [[1, 1], [1, 1], [1, 1]]}', "expected at least 3 different points, got 0"),
+    ("json", '{"verts": [[1, 1], [1, 1], [1, 1]]}', "expected at least 3 different points, got 1"),
     ("geojson", build_geojson("Polygon", [[[1, 1], [1, 1], [1, 1]]]), NONE),
     ("geojson", build_geojson("Polygon", [[[0, 0], [2, 0], [0, 0]]]), NONE),
     ("geojson", build_geojson("Polygon", [[]]), "a list of at least 1 point"),

@@ -203,7 +203,13 @@ def test_a_map_around_a_pole_is_rejected(tmp_path: Path) -> None:
 
 
 def test_dropped_paths_of_obstacles_are_reported(tmp_path: Path) -> None:
-    report = export_map(load_map("forklifts"), tmp_path / "forklifts.geojson")
-    assert "the 2 paths of moving obstacles, which are written at their positions at time 0" in report.dropped
+    forklifts = load_map("forklifts")
+    report = export_map(forklifts, tmp_path / "forklifts.geojson")
+    assert "motion of 2 obstacles (written at their positions at 0 s)" in report.dropped
+    moving = [shape for shape in forklifts.obstacles if shape.path is not None]
+    others = [shape for shape in forklifts.obstacles if shape.path is None]
+    single = replace(forklifts, obstacles=(*others, moving[0]))
+    report = export_map(single, tmp_path / "forklift.geojson")
+    assert "motion of 1 obstacle (written at its position at 0 s)" in report.dropped
     without_paths = export_map(load_map("rooms"), tmp_path / "rooms.geojson")
-    assert not any("path" in line for line in without_paths.dropped)
+    assert not any("motion" in line for line in without_paths.dropped)

@@ -75,7 +75,15 @@ def test_a_closed_ring_with_repeated_vertices_is_read(tmp_path: Path) -> None:
     environment, report = import_plan(write(tmp_path, build_plan(verts)))
     assert len(environment.boundary) == 4
     assert environment.area == 15.0
+    assert report.repaired == ("1 repeated vertex removed",)
+    _, report = import_plan(write(tmp_path, build_plan([*verts[:3], *verts[2:]])))
     assert report.repaired == ("2 repeated vertices removed",)
+
+
+def test_a_closed_ring_needs_no_repair(tmp_path: Path) -> None:
+    verts = [[0, 0], [5, 0], [5, 3], [0, 3], [0, 0]]
+    _, report = import_plan(write(tmp_path, build_plan(verts)))
+    assert report.repaired == ()
 
 
 def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
@@ -120,8 +128,8 @@ def test_starts_are_added(tmp_path: Path) -> None:
         (build_plan([[0, 0], [1, True], [1, 1]]), "verts[1]: expected a point"),
         (build_plan([[0, 0], [1, 0, 0], [1, 1]]), "verts[1]: expected a point"),
         (build_plan([[0, 0], [1, 0], [1e9, 1]]), "verts[2]: expected a point"),
-        (build_plan([[0, 0], [1, 1], [0, 0], [1, 1], [1, 1]]), "verts: expected an outline with an area"),
-        (build_plan([[0, 0], [0, 0], [1, 1]]), "verts: expected at least 3"),
+        (build_plan([[0, 0], [1, 1], [0, 0], [1, 1], [1, 1]]), "expected at least 3 different points, got 2"),
+        (build_plan([[0, 0], [0, 0], [1, 1]]), "verts: expected at least 3 different points, got 2"),
         (build_plan([[0, 0], [1, 1], [3, 3]]), "verts: expected an outline with an area"),
         (build_plan([[0, 0], [0.15, 0], [0.15, 9], [0, 9]]), "no position has enough clearance for a robot"),
         (build_plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),

@@ -106,6 +106,17 @@ def test_the_picture_is_not_written_over_the_yaml(tmp_path: Path) -> None:
     assert exporter.list_files(Path("a.yaml"), WriteOptions(mode="scale")) == (Path("a.yaml"), Path("a.png"))
 
 
+def test_both_files_are_replaced_or_neither(tmp_path: Path) -> None:
+    export_map(CORNER, tmp_path / "corner.yaml")
+    picture = (tmp_path / "corner.pgm").read_bytes()
+    (tmp_path / "corner.yaml").unlink()
+    (tmp_path / "corner.yaml").mkdir()
+    with pytest.raises(OutputError, match="expected a file, got a folder"):
+        export_map(load_map("rooms"), tmp_path / "corner.yaml")
+    assert (tmp_path / "corner.pgm").read_bytes() == picture
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["corner.pgm", "corner.yaml"]
+
+
 def test_the_same_map_gives_the_same_bytes(tmp_path: Path) -> None:
     office = load_map("office")
     for folder in ("one", "two"):

@@ -56,6 +56,8 @@ def test_a_text_that_fits_is_not_shortened(text: str) -> None:
 def test_a_text_keeps_a_minimum_of_characters() -> None:
     assert shorten_text("Lloyd", len, 0) == ""
     assert shorten_text("Lloyd", len, 0, min_chars=1) == "L…"
+    assert shorten_text("L", len, 0, min_chars=1) == "L"
+    assert shorten_text("Lloyd", len, 2, min_chars=5) == "Lloyd"
 
 
 def test_a_shortened_word_keeps_both_ends() -> None:

@@ -1,10 +1,13 @@
 """Files that pages upload to the folder of a served window, and download from it."""
 
 import errno
+import io
 import json
+import os
 import time
 import urllib.error
 import urllib.request
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +15,7 @@ import pygame
 import pytest
 
 from robocov_app.web.events import MAX_UPLOAD_BYTES, PointerMoved, Uploaded
+from robocov_app.web.files import read_saved
 
 pytest.importorskip("websockets")
 
@@ -47,6 +51,18 @@ def build_download_link(display, name):
 
 
 # Downloads
+
+
+def test_files_from_before_1980_are_archived(tmp_path):
+    """Zip archives have no earlier dates; computers without a battery for their clock write such files."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "record.json").write_text("1")
+    os.utime(folder / "record.json", (0, 0))
+    name, content = read_saved(folder)
+    assert name == "run.zip"
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert archive.read("run/record.json") == b"1"
 
 
 def test_saved_files_are_offered_but_neither_uploads_nor_foreign_files(display, folder, teacher):

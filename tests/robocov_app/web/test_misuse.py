@@ -266,7 +266,7 @@ def test_large_files_are_rejected_without_reading_them(display, folder):
         urllib.request.urlopen(display.link.replace("/?", "/saved/long.mp4?"))
     with error.value as response:
         assert response.code == 404
-        assert b"larger than 256 MB; copy it from the folder" in response.read()
+        assert b"larger than 256 MB; copy it directly from the server's folder" in response.read()
 
 
 def test_the_memory_of_unfinished_downloads_is_limited(display, folder, monkeypatch):

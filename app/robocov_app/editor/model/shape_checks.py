@@ -85,7 +85,7 @@ def _check_wall(wall: env.WallObstacle) -> Iterator[Problem]:
     if len(points) < 2 or extent < MIN_SIZE_M:
         yield Problem("it has no length: it needs two different points", _build_line(points))
     elif extent > MAX_SIZE_M:
-        message = f"it is {extent:.5g} m long: it must not exceed {MAX_SIZE_M / 1000:g} km"
+        message = f"it is {_format_number(extent)} m long: it must not exceed {MAX_SIZE_M / 1000:g} km"
         yield Problem(message, _build_line(points))
 
 
@@ -141,8 +141,8 @@ def _check_ring(ring: Ring, label: str = "its outline") -> Iterator[Problem]:
     extent = np.ptp(points, axis=0)
     polygon = Polygon(points)
     if extent.max() > MAX_SIZE_M:
-        size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
-        message = f"{label} is {size} large: it must not exceed {MAX_SIZE_M / 1000:g} km"
+        size = f"{_format_number(extent[0])} × {_format_number(extent[1])} m"
+        message = f"{label} measures {size}: neither side may exceed {MAX_SIZE_M / 1000:g} km"
         yield Problem(message, _build_line(points))
     elif _is_flat(polygon, extent):
         yield Problem(f"{label} encloses nothing: its corners lie on one line", _build_line(points))
@@ -199,7 +199,7 @@ def _check_size(label: str, size: float, points: Ring) -> Iterator[Problem]:
     point = None
     if points:
         point = shapely.Point(points[0])
-    yield Problem(f"its {label} is {size:.5g} m: it {limit}", point)
+    yield Problem(f"its {label} is {_format_number(size)} m: it {limit}", point)
 
 
 def _check_distance(points: Ring) -> Iterator[Problem]:
@@ -210,6 +210,13 @@ def _check_distance(points: Ring) -> Iterator[Problem]:
             limit = f"coordinates must be within {MAX_COORDINATE_M / 1000:.0f} km of the origin"
             yield Problem(f"{format_position(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
+
+
+def _format_number(value: float) -> str:
+    """Format a number with five digits, or as a whole number from 100,000 to a billion."""
+    if 1e5 <= value < 1e9:
+        return f"{value:.0f}"
+    return f"{value:.5g}"
 
 
 def _build_line(points: FloatArray) -> shapely.Geometry | None:

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from PIL import Image, UnidentifiedImageError
 
-from robocov.errors import MapError
+from robocov.errors import MapError, describe_error, to_one_line
 from robocov.mapfile import find_map_file, list_bundled_maps
 from robocov.text import remove_controls
 from robocov_app.editor.editor import Editor
@@ -314,7 +314,7 @@ class FileCommands:
         state = editor.document.check_disk(editor.now)
         title = editor.document.title
         if state == "gone":
-            editor.show_message(f"{title} no longer exists; Ctrl+S writes it again", is_error=True)
+            editor.show_message(f"{title} no longer exists. Press Ctrl+S to save it again.", is_error=True)
         elif state == "changed":
             text = f"Another program has changed {title}. Reloading can be undone."
             reload = ("Reload", "r", self.reload)
@@ -336,19 +336,24 @@ class FileCommands:
 
 
 def set_background_file(editor: Editor, path: Path) -> None:
-    """Set the background image to an image file. It becomes as wide as the map, or gets a default width.
+    """Set the background image to an image file.
+
+    The first image becomes as wide as the map. One that replaces another gets the default width.
 
     Raises
     ------
     MapError
-        If the file is not an image, or its path cannot be written to a map.
+        If the file cannot be read, is not an image, or its path cannot be written to a map.
     """
     require_regular_file(path)
     try:
         with Image.open(path) as image:
             pixels = image.size
-    except _IMAGE_ERRORS:
-        raise MapError(f"{path}: not an image that can be read") from None
+    except _IMAGE_ERRORS as error:
+        # Pillow raises an OSError without a number for a file that is not an image.
+        if isinstance(error, OSError) and error.errno is not None:
+            raise MapError(f"{to_one_line(path)}: cannot be read: {describe_error(error)}") from None
+        raise MapError(f"{to_one_line(path)}: cannot be read as an image") from None
     name = _describe_image_path(path, editor.document.path)
     if remove_controls(name) != name:
         raise MapError(f"{path}: expected an image whose path is text, got control characters or other bytes")

@@ -42,10 +42,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if not isinstance(document, dict) or "verts" not in document:
         raise MapError(f'{file.source_name}: not a HouseExpo plan, expected an object with "verts"')
     vertices = _parse_vertices(file, document["verts"])
+    point_count = len(np.unique(vertices, axis=0))
+    if point_count < 3:
+        raise MapError(f"{file.source_name}: verts: expected at least 3 different points, got {point_count}")
     is_new = (vertices != np.roll(vertices, 1, axis=0)).any(axis=1)
     ring = vertices[is_new]
-    if len(ring) < 3:
-        raise MapError(f"{file.source_name}: verts: expected at least 3 different points, got {len(ring)}")
+    # The last vertex of a closed ring repeats the first one.
+    is_closed = bool((vertices[0] == vertices[-1]).all())
     enclosed = find_enclosed_area([ring], crossings=CrossingCounter(file.source_name))
     if enclosed.area.is_empty:
         raise MapError(f"{file.source_name}: verts: expected an outline with an area, got 0 m²")
@@ -56,7 +59,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         free=free,
         vertices_read=len(vertices),
         cut_corners=True,
-        repaired=_describe_repairs(len(vertices) - len(ring), enclosed),
+        repaired=_describe_repairs(len(vertices) - len(ring) - is_closed, enclosed),
         dropped=dropped,
     )
 
@@ -100,7 +103,8 @@ def _remove_small_holes(area: MultiPolygon) -> tuple[MultiPolygon, tuple[str, ..
 def _describe_repairs(repeated_vertices: int, enclosed: EnclosedArea) -> tuple[str, ...]:
     repaired = []
     if repeated_vertices:
-        repaired.append(f"{repeated_vertices} repeated vertices removed")
+        noun = "vertex" if repeated_vertices == 1 else "vertices"
+        repaired.append(f"{repeated_vertices} repeated {noun} removed")
     if enclosed.invalidity is not None:
         repaired.append(f"the outline crossed or touched itself: {enclosed.invalidity}")
     return tuple(repaired)

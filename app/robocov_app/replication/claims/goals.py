@@ -345,7 +345,8 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
     families = f"{', '.join(UNSEEN[:-1])} and {UNSEEN[-1]}"
     statement = (
         f"On generated {families}, {own.label} meets limits on gap, contacts and settling, "
-        "and its median cost is not above that of the paper's strongest controllers."
+        "and in the median over runs, its cost is not above that of the paper's strongest controllers in the "
+        "same run."
     )
     claim = Claim("goal-unseen", GOALS, statement)
     return claim.judge(criteria, explanation, finished, runs_per_instance=1)

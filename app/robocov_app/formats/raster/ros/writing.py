@@ -74,9 +74,10 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             pixels = _build_scale_pixels(occupancy, unknown, has_alpha=not is_pgm)
             if is_pgm:
                 notes = ("a PGM of mode scale has no unknown cells: cells outside are occupied",)
-    _write_picture(image, pixels, grid.cell)
     x, y = grid.origin
-    with replace_file(path) as temporary:
+    # Neither file is replaced before both have been written.
+    with replace_file(path) as temporary, replace_file(image) as temporary_image:
+        _write_picture(temporary_image, pixels, grid.cell)
         temporary.write_text(
             f"image: {image_name}\nmode: {mode}\nresolution: {grid.cell!r}\n"
             f"origin: [{x!r}, {y!r}, 0.0]\n"
@@ -146,12 +147,11 @@ def _build_scale_pixels(occupancy: Float32Array, unknown: BoolArray, *, has_alph
 def _write_picture(path: Path, pixels: NDArray[np.uint8], cell: float) -> None:
     """Write pixels, whose bottom row is first, as a PGM or PNG."""
     picture = np.ascontiguousarray(pixels[::-1])
-    with replace_file(path) as temporary:
-        if path.suffix == ".pgm":
-            rows, columns = picture.shape
-            header = f"P5\n# robocov {cell!r} m/pix\n{columns} {rows}\n255\n"
-            temporary.write_bytes(header.encode("ascii") + picture.tobytes())
-        else:
-            import PIL.Image
+    if path.suffix == ".pgm":
+        rows, columns = picture.shape
+        header = f"P5\n# robocov {cell!r} m/pix\n{columns} {rows}\n255\n"
+        path.write_bytes(header.encode("ascii") + picture.tobytes())
+    else:
+        import PIL.Image
 
-            PIL.Image.fromarray(picture).save(temporary, format="PNG")
+        PIL.Image.fromarray(picture).save(path, format="PNG")
