@@ -70,8 +70,8 @@ class Options:
             is_given = getattr(self, option.name) != option.default
             if is_given and option.name not in supported:
                 words = ", ".join(map(_format_option, sorted(supported))) or "none"
-                known = f"no option of the format {format_name}, whose options are: {words}"
-                raise ParameterError(f"{_format_option(option.name)}: {known}")
+                reason = f"not supported by the format {format_name} (supported: {words})"
+                raise ParameterError(f"{_format_option(option.name)}: {reason}")
 
 
 def _format_option(name: str) -> str:

@@ -190,7 +190,10 @@ def _measure_size(lattice: int, vertices: int, *, quick: bool) -> Iterator[Row]:
 
 
 def _measure_map(name: str, lattice: int, *, quick: bool) -> Iterator[Row]:
-    """Measure the cost on a bundled map for each team size in `EARLIER_RATIOS`, compared with a k-d tree."""
+    """Time the evaluation of the cost on a bundled map for each team size in `EARLIER_RATIOS`.
+
+    The baseline is a k-d tree.
+    """
     cost = CoverageCost(load_map(name), lattice)
     for (map_name, map_lattice, robots), earlier_ratio in EARLIER_RATIOS.items():
         if (map_name, map_lattice) != (name, lattice):

@@ -140,7 +140,7 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
             sys.stdout.write(insert_description(help_text.getvalue(), kind.__doc__ or "", width))
             raise
         problem = _add_suggestion(summarize_tyro_error(error_text.getvalue()), kind, command)
-        raise InputError(f"{problem} (robocov {command} -h explains)") from None
+        raise InputError(f"{problem} (see robocov {command} -h)") from None
 
 
 def _add_suggestion(problem: str, kind: Any, command: str) -> str:

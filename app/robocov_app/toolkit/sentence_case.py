@@ -4,9 +4,9 @@ _PUNCTUATION = ",:;"
 
 
 def to_sentence_case(text: str) -> str:
-    """Return a text with a capital first letter, unless its first word is a name.
+    """Capitalize the first letter of a text, unless its first word looks like a name.
 
-    Words with digits, signs or capitals are names, such as those of files and parameters.
+    Words with digits, signs or capitals look like names, such as those of files and parameters.
 
     >>> to_sentence_case("session saved: rooms.robocov")
     'Session saved: rooms.robocov'

@@ -163,7 +163,9 @@ def read_saved(path: Path) -> tuple[str, bytes]:
             members = [path]
         if sum(member.stat().st_size for member in members) > MAX_DOWNLOAD_BYTES:
             limit = f"{MAX_DOWNLOAD_BYTES >> 20} MB"
-            raise TransferError(f"{path.name}: larger than {limit}; copy it directly from the server's folder")
+            raise TransferError(
+                f"{path.name}: larger than {limit}; copy it directly from the server's folder"
+            )
         if path.is_dir():
             return f"{path.name}.zip", _zip_files(members, path.parent)
         return path.name, path.read_bytes()

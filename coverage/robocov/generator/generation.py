@@ -68,6 +68,10 @@ _GAP_TOLERANCE_M = 1e-6
 """Maximum rounding error of a measured gap."""
 
 
+class NoLayoutError(ParameterError):
+    """No layout was found that meets the requirements of a map; another seed may have one."""
+
+
 @dataclass(frozen=True)
 class MapKind:
     """A kind of generated maps.
@@ -218,7 +222,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
         environment_with_starts = _add_starts(environment, request, corner_disc)
         if environment_with_starts is not None:
             return environment_with_starts
-    raise ParameterError(
+    raise NoLayoutError(
         f"area: found no {request.width:g} x {request.height:g} m layout of {request.obstacle_count} "
         f"{map_kind.obstacle_name} with a blocked fraction of {request.blocked_fraction:g} and gaps of "
         f"{request.gap:g} m. Try another area, a narrower gap or another number of {map_kind.obstacle_name}"

@@ -138,8 +138,8 @@ def test_the_maps_of_the_paper_are_generated(tmp_path: Path, capsys: pytest.Capt
         ("--width 5 --height 2000", "--height: expected a number from 1 to 1000, got 2000.0"),
         ("--side 5 --width 5 --height 5", "--side: cannot be combined with --width and --height, got 5"),
         ("--count 0 --out maps", "--count: expected a number from 1 to 10000, got 0"),
-        ("--count 3", "--out: required with --count and --study, as the folder of the maps"),
-        ("--study full", "--out: required with --count and --study, as the folder of the maps"),
+        ("--count 3", "--out: --count and --study require a folder for the maps"),
+        ("--study full", "--out: --count and --study require a folder for the maps"),
         (
             "--study full --gap 0.7 --out maps",
             "--gap: cannot be combined with --study, which gives its value; got 0.7",
@@ -171,6 +171,21 @@ def test_the_seed_without_a_layout_is_reported(tmp_path: Path, capsys: pytest.Ca
     arguments = ["--count", "2", "--seed", "4", "--area", "0.8", "--out", str(tmp_path / "maps")]
     assert main(["generate", *arguments]) == 2
     assert capsys.readouterr().err.splitlines()[-1].endswith("or another number of obstacles (seed 4)")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("--seed -1", "--seed: expected a whole number of at least 0, got -1"),
+        ("--width 5 --height 5000", "--height: expected a number from 1 to 1000, got 5000.0"),
+    ],
+)
+def test_errors_that_do_not_depend_on_the_seed_do_not_name_it(
+    arguments: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "maps")
+    assert main(["generate", "--count", "2", "--out", out, *arguments.split()]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].endswith(message)
 
 
 def test_an_existing_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -84,11 +84,11 @@ def test_the_source_file_is_never_overwritten(tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("file", "arguments", "expected"),
     [
-        ("plan.yaml", "--water free", "--water: no option of the format ros, whose options are: --anywhere"),
-        ("plan.yaml", "--cell 1", "--cell: no option of the format ros"),
-        ("plan.yaml", "--invert", "--invert: no option of the format ros"),
-        ("grid.map", "--unknown free", "--unknown: no option of the format movingai, whose options are: --"),
-        ("grid.map", "--min-stroke 3px", "--min-stroke: no option of the format movingai"),
+        ("plan.yaml", "--water free", "--water: not supported by the format ros (supported: --anywhere"),
+        ("plan.yaml", "--cell 1", "--cell: not supported by the format ros"),
+        ("plan.yaml", "--invert", "--invert: not supported by the format ros"),
+        ("grid.map", "--unknown free", "--unknown: not supported by the format movingai (supported: --"),
+        ("grid.map", "--min-stroke 3px", "--min-stroke: not supported by the format movingai"),
         ("plan.pgm", "--trees obstacle", "format image, whose options are: --cell, --color-tolerance, --"),
         ("plan.pgm", "", "expected --cell, the meters per pixel (or import plan.yaml next to it)"),
         ("plan.pgm", "--cell nan", "--cell: expected a number from 0.000001 to 10000 m"),

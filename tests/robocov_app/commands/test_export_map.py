@@ -57,7 +57,7 @@ def test_errors_are_reported_in_one_line_and_leave_no_files(
         ("export square", "this option is required"),
         ("export square -o x.doc", "x.doc: unknown format, expected a file ending in one of"),
         ("export square -o x.svg --format doc", "--format: expected one of"),
-        ("export square -o x.svg --cell 1", "--cell: no option of the format svg"),
+        ("export square -o x.svg --cell 1", "--cell: not supported by the format svg"),
         ("export square -o none/x.svg", "cannot be written"),
         ("export nowhere -o x.svg", "nowhere"),
         ("export square -o x.svg --digits 99", "digits: expected a number from 0 to 12, got 99"),

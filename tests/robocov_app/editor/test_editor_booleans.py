@@ -17,7 +17,6 @@ from robocov_app.editor.model.geometry import extract_polygons
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 
-
 BOW_TIE = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
 PATH = ObstaclePath(((2.0, 2.0), (8.0, 2.0)), 0.5, "back-and-forth")
 

@@ -127,7 +127,10 @@ def resize_single_position(sketch: Sketch) -> None:
         (lambda s: transform.rotate(s, ALL, math.inf), "an angle"),
         (lambda s: transform.scale(s, ALL, 0.0, 0.0), "a factor other than 0"),
         (lambda s: transform.scale(s, ALL, 1e9, 1e9), r"the factor 1e\+09 is too small or too large"),
-        (lambda s: transform.scale(s, Selection.of("corner"), 1.0, 2.0), "by the same factor both ways"),
+        (
+            lambda s: transform.scale(s, Selection.of("corner"), 1.0, 2.0),
+            "by the same factor along both axes",
+        ),
         (lambda s: transform.resize(s, Selection.of(0), None, None), "a width or a height"),
         (lambda s: transform.resize(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
         (lambda s: transform.resize(s, Selection.of("all"), 1.0, None), "select something"),

@@ -108,9 +108,9 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
         ((9.23, 6.58), ("grid",), (9.2, 6.6), "grid"),
         ((7.54, 5.04), ("vertex",), (7.54, 5.04), "vertex"),
         # Alignment with corners of the box.
-        ((4.06, 6.5), ("aligned",), (4.0, 6.5), "in line"),
-        ((4.06, 6.5), ("aligned", "grid"), (4.0, 6.5), "in line"),
-        ((11.0, 3.04), ("aligned",), (11.0, 3.0), "in line"),
+        ((4.06, 6.5), ("aligned",), (4.0, 6.5), "aligned"),
+        ((4.06, 6.5), ("aligned", "grid"), (4.0, 6.5), "aligned"),
+        ((11.0, 3.04), ("aligned",), (11.0, 3.0), "aligned"),
     ],
 )
 def test_nearby_targets_are_snapped_to(targets, point, kinds, snapped_point, words):

@@ -51,7 +51,7 @@ def test_unknown_formats_and_options_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="unknown format 'rosy': did you mean 'ros'"):
         export_map(ROOM, "a.yaml", format="rosy")
     with pytest.raises(
-        ParameterError, match="--mode: no option of the format image, whose options are: --cell"
+        ParameterError, match=r"--mode: not supported by the format image \(supported: --cell"
     ):
         export_map(ROOM, tmp_path / "a.png", options=WriteOptions(mode="raw"))
     for options, expected in (

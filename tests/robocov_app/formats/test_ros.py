@@ -339,7 +339,7 @@ def test_maps_without_free_cells_are_rejected(tmp_path: Path) -> None:
 def test_options_of_other_formats_are_rejected(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     with pytest.raises(
-        ParameterError, match="--trees: no option of the format ros, whose options are: --anywhere, --"
+        ParameterError, match=r"--trees: not supported by the format ros \(supported: --anywhere, --"
     ):
         import_map(path, options=ReadOptions(trees="free"))
     with pytest.raises(ParameterError, match=r"--threshold: not applicable: .*plan\.yaml is of mode trinary"):

@@ -197,7 +197,7 @@ def test_impossible_exports_are_rejected(
 ) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         export_map(empty, tmp_path / "none" / "plan.wkt")
-    with pytest.raises(ParameterError, match="cell: no option of the format wkt"):
+    with pytest.raises(ParameterError, match="cell: not supported by the format wkt"):
         export_map(empty, tmp_path / "plan.wkt", options=WriteOptions(cell=0.1))
     with pytest.raises(ParameterError, match=r"origin: expected a longitude from -180 to 180"):
         WriteOptions(origin=(200, 0))

@@ -53,7 +53,7 @@ def test_a_wrong_word_gets_one_line_whatever_the_terminal(
     monkeypatch.setenv("COLUMNS", "40")
     with pytest.raises(InputError) as caught:
         parse_options(Options, "try", words.split())
-    assert str(caught.value) == f"{message} (robocov try -h explains)"
+    assert str(caught.value) == f"{message} (see robocov try -h)"
 
 
 def test_a_box_in_either_drawing() -> None:

@@ -151,13 +151,15 @@ def command(options: Arguments) -> None:
 
 
 def _build_map(task: _MapTask) -> Environment:
-    """Build a map. Error messages name the option and, in a series of maps, the seed."""
+    """Build a map. Error messages name the option and, in a series of maps, the seed without a layout."""
+    from robocov.generator.generation import NoLayoutError
+
     try:
         return task.build()
     except ParameterError as error:
         # The message begins with the name of the parameter, which is also that of the option.
         message = f"--{error}"
-        if task.reported_seed is not None:
+        if isinstance(error, NoLayoutError) and task.reported_seed is not None:
             message += f" (seed {task.reported_seed})"
         raise ParameterError(message) from None
 
@@ -191,9 +193,12 @@ def _describe_map(report: MapReport) -> str:
 
 
 def _prepare_folder(folder: Path | None, *, overwrite: bool) -> None:
-    """Create the folder of the maps; raise an error if it is missing, not writable or not empty."""
+    """Create the folder for the maps.
+
+    Raise an InputError if none is given or it is not empty, and an OutputError if it cannot be created.
+    """
     if folder is None:
-        raise InputError("--out: required with --count and --study, as the folder of the maps")
+        raise InputError("--out: --count and --study require a folder for the maps")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         is_empty = not any(folder.iterdir())

@@ -432,7 +432,7 @@ def draw_typed_text(canvas: Canvas, text: str, pixel: Point) -> None:
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
-    """Draw the narrowest gap, in the color of warnings if robots with a radius, m, do not fit through it."""
+    """Draw the narrowest gap, in the warning color if robots of the given radius, m, do not fit through."""
     start, end, across = _locate_gap(canvas, gap)
     color = canvas.theme.start
     if is_too_narrow(gap, radius):

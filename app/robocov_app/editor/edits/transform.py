@@ -108,7 +108,9 @@ class Affine:
             If a disc-shaped start would be scaled unequally.
         """
         if self.factor is None and isinstance(shape, DiscStart):
-            raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
+            raise MapError(
+                "a disc-shaped start cannot be stretched: scale it by the same factor along both axes"
+            )
         if self.factor is None and isinstance(shape, CircleObstacle):
             shape = PolygonObstacle(shape.polygon.exterior.coords[:-1], (), shape.name, shape.path)
         changes = {}

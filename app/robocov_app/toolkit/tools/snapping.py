@@ -36,7 +36,7 @@ class Guide:
     line : tuple of Point
         Line to the snapped point, m; a single point for a mark.
     label : str
-        Short text such as "vertex", "45°" or "in line".
+        Short text such as "vertex", "45°" or "aligned".
     """
 
     kind: SnapKind
@@ -358,7 +358,7 @@ class _SnapSearch:
             for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))):
                 mark = self.targets.find_aligned(self.point, axis, reach, MAX_ALIGNMENT_REACHES * reach)
                 if mark is not None:
-                    yield _SnapLine("aligned", mark, direction, (mark,), "in line")
+                    yield _SnapLine("aligned", mark, direction, (mark,), "aligned")
         if "edge" in self.settings.kinds:
             yield from islice(self.list_edges(), MAX_EDGE_LINES)
 

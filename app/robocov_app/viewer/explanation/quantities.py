@@ -30,7 +30,7 @@ def format_direction(vector: complex) -> str:
 
 
 def format_number(value: float) -> str:
-    """Format a non-negative number with about two digits.
+    """Format a non-negative number: with two decimals below 1, one below 10, and none above.
 
     >>> [format_number(value) for value in (0.001, 0.314, 2.44, 12.3, 1e9)]
     ['0', '0.31', '2.4', '12', 'over a million']

@@ -63,6 +63,7 @@ _REPORT_INDENT_PX = 34.0
 _LABEL_PX = 116
 _RESET_PX = 22
 _PARAMETER_GAP_PX = 3
+_BUTTON_MARGIN_PX = 3  # on each side of the text of a small button
 _NUMBER_PX = (58, 42)  # the value and its unit
 _UNLIMITED_PX = (103,)  # the word "unlimited" instead of value and unit
 _ROW_PX = 24
@@ -324,7 +325,8 @@ class ViewerPanel(CommandPanel):
         choices = parameter.choices
         free = ui.width - _LABEL_PX - _RESET_PX - 2 * _PARAMETER_GAP_PX
         width = (free - _PARAMETER_GAP_PX * (len(choices) - 1)) / len(choices)
-        fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), width - 6) == choice for choice in choices)
+        text_width = width - 2 * _BUTTON_MARGIN_PX
+        fits = all(shorten_to_width(choice, round(SMALL_TEXT_PX), text_width) == choice for choice in choices)
         columns = [0.0] * (len(choices) if fits else 1)
         ui.row(_LABEL_PX, *columns, _RESET_PX, height=_ROW_PX, gap=_PARAMETER_GAP_PX, below=3)
         ui.label(parameter.label, tip=_build_tip(parameter))

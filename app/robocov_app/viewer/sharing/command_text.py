@@ -55,7 +55,9 @@ def can_be_command(run: SharedRun) -> bool:
 
 
 def build_command(run: SharedRun) -> str:
-    """Return the command that simulates a run; one line per controller if a controller is in it twice.
+    """Return the command that simulates a run.
+
+    If a controller occurs more than once, there is one line per controller.
 
     Parameters
     ----------

@@ -102,7 +102,7 @@ def _draw_staging(rng: np.random.Generator, drawing: Drawing, bays_x: list[float
 
 
 def _draw_racks_across(rng: np.random.Generator, drawing: Drawing, hall: _Hall) -> None:
-    """Draw racks at right angles to the side with the loading bays, a cross aisle, and a cage."""
+    """Draw pallets, a cage, and racks at right angles to the loading bays, with a cross aisle."""
     aisle = rng.uniform(2.7, 3.1)
     cross_y = hall.dock_depth + (hall.height - hall.dock_depth) * rng.uniform(0.48, 0.58)
     cage_left = hall.width - _CAGE_M
@@ -120,7 +120,7 @@ def _draw_racks_across(rng: np.random.Generator, drawing: Drawing, hall: _Hall) 
 
 
 def _draw_racks_along(rng: np.random.Generator, drawing: Drawing, hall: _Hall) -> None:
-    """Draw racks parallel to the side with the loading bays, pallets, and a cage in a rectangular hall."""
+    """Draw pallets, racks parallel to the loading bays and, in a rectangular hall, a cage."""
     aisle = rng.uniform(2.7, 3.1)
     # Cross aisles divide the racks into three blocks.
     blocks_x = np.linspace(_WALL_AISLE_M, hall.width - _WALL_AISLE_M, 4).tolist()

@@ -2,8 +2,8 @@
 
 XML is written by openstreetmap.org, JOSM, osmium and Overpass: https://wiki.openstreetmap.org/wiki/OSM_XML.
 JSON is what Overpass returns for ``[out:json]``, and the file ``map.json`` of the API:
-https://wiki.openstreetmap.org/wiki/OSM_JSON. With ``out geom``, Overpass adds the positions of nodes to ways and
-relations in both formats.
+https://wiki.openstreetmap.org/wiki/OSM_JSON. In both, Overpass adds the positions of nodes to ways and
+relations for ``out geom``.
 """
 
 from __future__ import annotations

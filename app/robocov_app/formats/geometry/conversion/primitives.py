@@ -39,7 +39,7 @@ _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 def restore_primitives(
     layout: MapLayout, simplified: SimplifiedSpace, unsimplified: MultiPolygon, conversion: Conversion
 ) -> MapLayout:
-    """Replace polygons of a layout that consist of circles and walls by these primitives.
+    """Replace polygons of a layout by the circles and walls of which they consist.
 
     A polygon stays if its primitives would leave a pocket next to them: an enclosed piece of free space that
     is tiny, or that was solid. It also stays if walls would have moved by more than the tolerance.

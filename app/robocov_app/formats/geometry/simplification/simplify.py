@@ -113,7 +113,9 @@ def simplify_free_space(
         if not closed.any():
             return SimplifiedSpace(parts, tolerance, _describe_problems(problems, radius))
         allowed[closed] = 0.0
-    return SimplifiedSpace(free, 0.0, ("not simplified: walls would have touched, or closed passages",))
+    return SimplifiedSpace(
+        free, 0.0, ("not simplified: walls would have touched, or passages would have closed",)
+    )
 
 
 def _tighten(

@@ -66,7 +66,7 @@ def decode_with_pillow(data: bytes, name: str, source_name: str, key: ColorKey) 
     except MapError:
         raise
     except _UnclearSamplesError as error:
-        way_out = "Save it with 8 bits, as gdal_translate -ot Byte -scale does"
+        way_out = "Convert it to 8 bits, for example with gdal_translate -ot Byte -scale"
         raise MapError(f"{source_name}: a TIFF whose brightness is unclear: {error}. {way_out}.") from None
     except PIL.Image.DecompressionBombError:
         millions = files.MAX_CELLS // 1_000_000

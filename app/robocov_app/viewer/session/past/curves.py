@@ -127,11 +127,12 @@ class Curve:
         return float(np.interp(time, self._times, self._values))
 
     def list_gaps(self, min_length: float) -> list[tuple[float, float]]:
-        """Return the intervals between samples that are longer than a length, s, the longest first.
+        """Return the intervals between successive samples that exceed a length, longest first.
 
         Parameters
         ----------
         min_length : float, s
+            Only longer intervals are returned.
 
         Returns
         -------

@@ -142,11 +142,11 @@ class RunHistory:
         return is_kept
 
     def _select_by_age(self, is_required: _Selection) -> _Selection:
-        """Select the required states, and as many of the others as `MAX_KEPT_FRACTION` allows.
+        """Select the required states and some of the others, preferably new ones.
 
-        A number of newest states are all kept. Of those that are up to twice as old as the oldest of these,
-        every second step is kept; up to four times as old, every fourth; and so on. That number is halved
-        until few enough states are left.
+        The newest `complete_count` states are all selected. Among states up to twice as old as those, every
+        second step is selected; among states up to four times as old, every fourth; and so on.
+        `complete_count` is halved until at most the fraction `MAX_KEPT_FRACTION` is selected, if possible.
         """
         count = len(self)
         steps = np.array(self.steps)

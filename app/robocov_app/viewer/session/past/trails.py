@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.environment import Point
-from robocov.typing import FloatArray, IntArray
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup
 
@@ -208,7 +208,7 @@ class Trail:
         """Remove the last row, and the starts of robots that are in no other row."""
         self._count -= 1
         self._section_start = min(self._section_start, self._count)
-        is_absent = np.isnan(self.positions[..., 0]).all(axis=0)
+        is_absent: BoolArray = np.all(np.isnan(self.positions[..., 0]), axis=0)
         for number in compress(self.numbers, is_absent):
             self._starts.pop(number, None)
         self._start_arrays = {}

@@ -1,0 +1,23 @@
+"""Source text of controllers in files of the user, read without running it."""
+
+from pathlib import Path
+
+import pytest
+
+from robocov.errors import ParameterError
+from robocov_app.sweep.study.controller_files import read_controller_source
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "reason"),
+    [
+        ("import numpy\ndef decide(:\n", ":2", "invalid syntax"),
+        ("x = 1\n  y = 2\n", ":2", "unexpected indent"),
+    ],
+)
+def test_a_syntax_error_is_reported_with_its_line(text: str, place: str, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    with pytest.raises(ParameterError) as caught:
+        read_controller_source("mine.py:Mine", tmp_path)
+    assert str(caught.value) == f"'mine.py:Mine': {path}{place}: not Python code: {reason}"
