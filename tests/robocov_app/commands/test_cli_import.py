@@ -89,7 +89,7 @@ def test_the_source_file_is_never_overwritten(tmp_path: Path, capsys: pytest.Cap
         ("plan.yaml", "--invert", "--invert: not supported by the format ros"),
         ("grid.map", "--unknown free", "--unknown: not supported by the format movingai (supported: --"),
         ("grid.map", "--min-stroke 3px", "--min-stroke: not supported by the format movingai"),
-        ("plan.pgm", "--trees obstacle", "format image, whose options are: --cell, --color-tolerance, --"),
+        ("plan.pgm", "--trees obstacle", "format image (supported: --cell, --color-tolerance, --"),
         ("plan.pgm", "", "expected --cell, the meters per pixel (or import plan.yaml next to it)"),
         ("plan.pgm", "--cell nan", "--cell: expected a number from 0.000001 to 10000 m"),
         ("plan.pgm", "--cell 1 --threshold 3", "--threshold: expected a number from 0 to 1"),
