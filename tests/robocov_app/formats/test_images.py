@@ -245,7 +245,7 @@ def test_a_tiff_of_unclear_samples_is_rejected(tmp_path: Path, image: bytes, fou
     with pytest.raises(MapError) as caught:
         read(tmp_path, image)
     message = str(caught.value)
-    assert f"a TIFF whose brightness is unclear: expected {found}. Save it with 8 bits" in message
+    assert f"a TIFF whose brightness is unclear: expected {found}. Convert it to 8 bits" in message
     assert "broken" not in message
 
 
