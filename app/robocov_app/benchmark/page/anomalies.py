@@ -1,7 +1,8 @@
 """Suspicious runs: teams that never move, and teams whose final cost is far above that of RAPF.
 
 Both are usually caused by a fault of the controller, such as a plan that cannot be followed, or a phase that
-never ends. A high cost is suspicious only for controllers that are usually better than RAPF.
+never ends. A high cost is suspicious only for controllers that are usually better than RAPF, on the same track
+or by far over all tracks.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,8 @@ MIN_PATH_LENGTH_M = 0.1
 """Minimum mean path length of a team that did not stay at rest."""
 MAX_RAPF_RATIO = 1.2
 """Maximum ratio of the final cost to that of RAPF in the same run for a run that is not suspicious."""
+CLEARLY_BETTER_RATIO = 0.9
+"""A controller whose median ratio over all runs is below this is expected to beat RAPF on every track."""
 
 _RunValues: TypeAlias = dict[tuple[str, RunKey], float]
 """A value for each run, by track and by map and seed."""
@@ -32,7 +35,9 @@ class Anomaly(NamedTuple):
 def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[Anomaly]:
     """Find the runs of a result in which the team never moved, or in which the final cost was far too high.
 
-    Costs far above that of RAPF are only reported on tracks on which the median cost is below that of RAPF.
+    Costs far above that of RAPF are only reported on tracks on which the controller is expected to beat RAPF:
+    those on which its median ratio of costs is below 1, or all tracks if the median ratio over all runs is
+    below `CLEARLY_BETTER_RATIO`.
 
     Parameters
     ----------
@@ -51,6 +56,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
         if key in rapf_costs
     }
     better_tracks = _find_better_tracks(ratios)
+    is_clearly_better = bool(ratios) and np.median(list(ratios.values())) < CLEARLY_BETTER_RATIO
     anomalies = []
     for row in result["rows"]:
         if "error" in row:
@@ -59,7 +65,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
         ratio = ratios.get((track, get_run_key(row)), 0.0)
         if row["path_length_m"] < MIN_PATH_LENGTH_M:
             reason = "at rest from the start"
-        elif ratio > MAX_RAPF_RATIO and track in better_tracks:
+        elif ratio > MAX_RAPF_RATIO and (is_clearly_better or track in better_tracks):
             reason = f"cost more than {MAX_RAPF_RATIO:g} times that of RAPF"
         else:
             continue

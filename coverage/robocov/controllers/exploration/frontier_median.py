@@ -58,6 +58,9 @@ class FrontierMedian(SharedMapController):
     are ignored, and so are frontiers that are shorter than `shortest` or out of reach. A frontier is also
     ignored after a robot has been there, or was stuck on its path to it. A robot stays where it is if no
     target has any utility left for it; in the paper, it moves to a target even then.
+
+    Robots out of communication range are assumed to have reached their targets, which then count as
+    inspected. With a short range, robots may therefore stop exploring too early.
     """
 
     name = "frontier-median"
