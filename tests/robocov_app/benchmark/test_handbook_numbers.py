@@ -322,14 +322,15 @@ def test_unfinished_runs_of_frontier_median_agree_with_the_entries() -> None:
     ) in text
     rows_by_run = {(row["track"], get_run_key(row)): row for row in result["rows"]}
     anomalies = find_anomalies(result, rapf)
-    settled_tracks = []
-    for anomaly in anomalies:
-        if rows_by_run[anomaly.track, (anomaly.map, anomaly.seed)]["settled_at_s"] is not None:
-            settled_tracks.append(anomaly.track)
+    settled_tracks = [
+        anomaly.track
+        for anomaly in anomalies
+        if rows_by_run[anomaly.track, (anomaly.map, anomaly.seed)]["settled_at_s"] is not None
+    ]
     assert settled_tracks == ["plans-crowd"] * 2
     assert (
-        f'lists {len(anomalies)} of its runs under "Runs to look into". {len(anomalies) - 2} of them have not '
-        "settled, either; the other two are on Plans crowd."
+        f'lists {len(anomalies)} of its runs under "Runs to look into". {len(anomalies) - 2} of them have '
+        "not settled, either; the other two are on Plans crowd."
     ) in text
 
 

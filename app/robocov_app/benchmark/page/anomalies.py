@@ -1,8 +1,8 @@
 """Suspicious runs: teams that never move, and teams whose final cost is far above that of RAPF.
 
 Both are usually caused by a fault of the controller, such as a plan that cannot be followed, or a phase that
-never ends. A high cost is suspicious only for controllers that are usually better than RAPF, on the same track
-or by far over all tracks.
+never ends. A high cost is suspicious only for controllers that are usually better than RAPF, either on the
+same track or by far over all tracks.
 """
 
 from collections.abc import Mapping, Sequence
