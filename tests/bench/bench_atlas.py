@@ -1,9 +1,11 @@
 """Measure the goals of the controller `atlas` that the benchmark's tracks do not cover.
 
-    python tests/bench/bench_atlas.py doors large-maps sizes ranges stakes rest pace --controller atlas-shared
+    python tests/bench/bench_atlas.py doors large-maps hard-maps sizes --controller atlas-shared
+    python tests/bench/bench_atlas.py ranges stakes rest pace --controller atlas-shared
 
 - ``doors``: whether robots find narrow doors in walls of random direction
 - ``large-maps``: the same in upright walls on larger maps, where nodes of planners are farther apart
+- ``hard-maps``: costs and rest in tunnels, behind narrow doors, next to a notch, and of three robots in rooms
 - ``sizes``: whether a larger team is ever worse than a smaller one
 - ``ranges``: gaps, rest and path lengths with limited ranges, next to `rapf`
 - ``stakes``: costs and path lengths for different values of the gain `stake`, on maps outside the benchmark
@@ -27,10 +29,12 @@ import numpy as np
 from robocov import (
     Conditions,
     CoverageCost,
+    DiscStart,
     Environment,
     Failure,
     Simulation,
     Team,
+    find_optimum,
     generate_map,
     load_map,
     make_controller,
@@ -60,6 +64,19 @@ DOORS_PER_WIDTH = 5
 MAX_LARGE_MAP_TIME_S = 120.0
 CROSSED_DISTANCE_M = 0.15
 """A robot has crossed the wall if its center is this far behind the wall's center line."""
+
+GRID_SIDE_M = 25.6
+"""Side of the square that is divided into equal rooms."""
+GRID_ROOMS = 4
+"""Number of rooms along a side of this square."""
+GRID_DOOR_WIDTH_M = 0.4
+MAX_GRID_DOOR_OFFSET_M = 1.5
+"""Maximum distance of a door from the center of the wall between two rooms."""
+GRID_SEED = 1
+HARD_MAP_LATTICE = 64
+REFERENCE_RESTARTS = 4
+"""Number of restarts of the search for the best placement on each of the hard maps."""
+RIVAL_CONTROLLER = "greedy-submodular"
 
 TEAM_SIZES = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200)
 MAX_CORNER_TEAM = 50
@@ -107,6 +124,46 @@ class LimitedRun(NamedTuple):
     """s, nan if the team does not come to rest."""
     mean_path_length: float
     """m"""
+
+
+class HardCase(NamedTuple):
+    """A run on a map that is difficult for planners."""
+
+    map_name: str
+    """Argument of `build_hard_map`."""
+    robots: int
+    duration: float
+    """s"""
+    start: str | None = None
+    """Name of the start; by default, the first of the map."""
+    start_seed: int = 0
+    has_rival: bool = False
+    """Whether `RIVAL_CONTROLLER` runs from the same positions."""
+
+
+class HardRun(NamedTuple):
+    """Result of a run on one of the hard maps."""
+
+    start_cost: float
+    """Mean distance at the start, m"""
+    end_cost: float
+    """Mean distance at the end, m"""
+    settling_time: float | None
+    """s"""
+    mean_path_length: float
+    """m"""
+
+
+HARD_CASES = (
+    HardCase("tunnels-7001", robots=6, duration=200.0, start="uniform", start_seed=1),
+    HardCase("tunnels-7001", robots=8, duration=200.0, start="uniform", start_seed=1),
+    HardCase("tunnels-7002", robots=6, duration=200.0, start="uniform", start_seed=1),
+    HardCase("tunnels-7002", robots=8, duration=200.0, start="uniform", start_seed=1),
+    HardCase("grid of rooms", robots=6, duration=120.0),
+    HardCase("house with a notch", robots=6, duration=120.0),
+    *(HardCase(f"rooms-{seed}", robots=3, duration=60.0, has_rival=True) for seed in ROOM_SEEDS),
+)
+"""The first four start anywhere in the tunnels, rather than together at the entrance as in the benchmark."""
 
 
 def build_wall(
@@ -213,6 +270,128 @@ def measure_large_maps(controller: str, count: int, pool: ProcessPoolExecutor) -
         counts = ", ".join(map(str, crossed_counts.tolist()))
         widths = ", ".join(f"{width:g}" for width in DOOR_WIDTHS_M)
         yield f"{side:g} m: {counts} of {DOORS_PER_WIDTH} doors of {widths} m crossed"
+
+
+def build_hard_map(name: str) -> Environment:
+    """Build a map of `HARD_CASES`."""
+    if name == "grid of rooms":
+        return build_grid_of_rooms()
+    if name == "house with a notch":
+        return build_house_with_notch()
+    kind, _, seed = name.rpartition("-")
+    if kind == "rooms":
+        return generate_map(int(seed), kind=kind)
+    return suite.load_suite_map(name)
+
+
+def build_grid_of_rooms() -> Environment:
+    """Build a square of equal rooms. Each has a narrow door to each of its neighbors."""
+    rng = np.random.default_rng(GRID_SEED)
+    room_side = GRID_SIDE_M / GRID_ROOMS
+    walls = []
+    for line in range(1, GRID_ROOMS):
+        position = line * room_side
+        for room in range(GRID_ROOMS):
+            start = room * room_side
+            end = start + room_side
+            for is_upright in (True, False):
+                offset = rng.uniform(-MAX_GRID_DOOR_OFFSET_M, MAX_GRID_DOOR_OFFSET_M)
+                door = (start + end) / 2.0 + offset
+                half_width = GRID_DOOR_WIDTH_M / 2.0
+                walls.append(build_straight_wall(position, start, door - half_width, is_upright=is_upright))
+                walls.append(build_straight_wall(position, door + half_width, end, is_upright=is_upright))
+    corners = ((0.0, 0.0), (GRID_SIDE_M, 0.0), (GRID_SIDE_M, GRID_SIDE_M), (0.0, GRID_SIDE_M))
+    starts = {"corner room": DiscStart((room_side / 2.0, room_side / 2.0), radius=1.0)}
+    return Environment("grid of rooms", corners, tuple(walls), starts)
+
+
+def build_house_with_notch() -> Environment:
+    """Build a U-shaped house of five rooms, whose convex hull contains the solid notch of the U."""
+    boundary = (
+        (0.0, 0.0),
+        (16.0, 0.0),
+        (16.0, 12.0),
+        (11.0, 12.0),
+        (11.0, 5.0),
+        (5.0, 5.0),
+        (5.0, 12.0),
+        (0.0, 12.0),
+    )
+    walls = (
+        # Walls across both wings, with doors of 0.9 m.
+        build_straight_wall(5.0, 0.0, 2.0, is_upright=False),
+        build_straight_wall(5.0, 2.9, 5.0, is_upright=False),
+        build_straight_wall(5.0, 11.0, 13.1, is_upright=False),
+        build_straight_wall(5.0, 14.0, 16.0, is_upright=False),
+        # Walls between the three rooms at the bottom, with doors of 0.9 m.
+        build_straight_wall(5.0, 0.0, 1.0, is_upright=True),
+        build_straight_wall(5.0, 1.9, 5.0, is_upright=True),
+        build_straight_wall(11.0, 0.0, 3.1, is_upright=True),
+        build_straight_wall(11.0, 4.0, 5.0, is_upright=True),
+    )
+    starts = {"left wing": DiscStart((2.5, 9.0), radius=1.0)}
+    return Environment("house with a notch", boundary, walls, starts)
+
+
+def build_straight_wall(position: float, start: float, end: float, *, is_upright: bool) -> WallObstacle:
+    """Build a wall from `start` to `end`, m, at x = `position` if it is upright, else at y = `position`."""
+    if is_upright:
+        points = ((position, start), (position, end))
+    else:
+        points = ((start, position), (end, position))
+    return WallObstacle(points, WALL_WIDTH_M)
+
+
+def run_hard_case(controller: str, case: HardCase) -> HardRun:
+    """Run a team on one of the hard maps."""
+    environment = build_hard_map(case.map_name)
+    starts = environment.start(case.start).sample(case.robots, seed=case.start_seed, radius=ROBOT_RADIUS_M)
+    record = Simulation(environment, make_controller(controller), starts).run(case.duration)
+    cost = CoverageCost(environment, HARD_MAP_LATTICE)
+    return HardRun(
+        start_cost=cost(starts).mean_distance,
+        end_cost=cost(record.positions[-1]).mean_distance,
+        settling_time=find_settling_time(record.time, record.positions),
+        mean_path_length=float(compute_path_lengths(record.positions).mean()),
+    )
+
+
+def compute_best_cost(case: HardCase) -> float:
+    """Return the mean distance of the best known placement on one of the hard maps, m."""
+    environment = build_hard_map(case.map_name)
+    optimum = find_optimum(
+        environment,
+        case.robots,
+        radius=ROBOT_RADIUS_M,
+        lattice=HARD_MAP_LATTICE,
+        restarts=REFERENCE_RESTARTS,
+    )
+    return optimum.mean_distance
+
+
+def measure_hard_case(controller: str, case: HardCase) -> str:
+    """Return the line of one case, with the same columns for each."""
+    run = run_hard_case(controller, case)
+    best_cost = compute_best_cost(case)
+    rest = "not settled"
+    if run.settling_time is not None:
+        rest = f"settled after {run.settling_time:.0f} s"
+    line = (
+        f"{case.map_name}, {case.robots} robots, {case.duration:g} s: "
+        f"{run.start_cost:.3f} m at the start, {run.end_cost:.3f} m at the end, "
+        f"best known {best_cost:.3f} m, gap {run.end_cost / best_cost - 1.0:.1%}; "
+        f"{rest}; path length {run.mean_path_length:.1f} m"
+    )
+    if case.has_rival:
+        rival_run = run_hard_case(RIVAL_CONTROLLER, case)
+        rival_gap = rival_run.end_cost / best_cost - 1.0
+        line += f"; {RIVAL_CONTROLLER}: gap {rival_gap:.1%}, path length {rival_run.mean_path_length:.1f} m"
+    return line
+
+
+def measure_hard_maps(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield costs, rest and path length of each case."""
+    yield from pool.map(partial(measure_hard_case, controller), HARD_CASES)
 
 
 def run_in_rooms(controller: str, seed: int, communication_range: float, robots: int) -> FinalState:
@@ -374,6 +553,7 @@ Measure: TypeAlias = Callable[[str, int, ProcessPoolExecutor], Iterator[str]]
 MEASURES: Mapping[str, Measure] = {
     "doors": measure_doors,
     "large-maps": measure_large_maps,
+    "hard-maps": measure_hard_maps,
     "sizes": measure_sizes,
     "ranges": measure_ranges,
     "stakes": measure_stakes,
