@@ -122,8 +122,8 @@ def compute_density_range(density: Density, bounds: Bounds) -> tuple[float, floa
     low = np.array(bounds[:2])
     high = np.array(bounds[2:])
     step = (high - low).max() / _RANGE_SAMPLES
-    x = np.arange(low[0] + 0.5 * step, high[0], step)
-    y = np.arange(low[1] + 0.5 * step, high[1], step)
+    x = _divide_evenly(low[0], high[0], step)
+    y = _divide_evenly(low[1], high[1], step)
     points = _build_grid(x, y)
     if isinstance(density, Gaussians):
         # The grid may miss a narrow peak, so the centers of peaks are samples as well.

@@ -1,13 +1,17 @@
 """Shading and descriptions of the density."""
 
 import numpy as np
+import pygame
 import pytest
 from density_cases import GAUSSIANS, POLYGONS
 
-from robocov.density import Gaussian, Gaussians, Raster, Uniform
+from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
 from robocov.environment import Environment
 from robocov_app.look.colors import compute_contrast, mix
+from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
 from robocov_app.render.density_shading import (
     color_density,
     compute_density_fractions,
@@ -15,6 +19,7 @@ from robocov_app.render.density_shading import (
     get_density_range,
 )
 from robocov_app.render.density_text import describe_density, get_cost_name
+from robocov_app.render.layers.density import draw_density_shading
 
 BOUNDS = (0.0, 0.0, 8.0, 8.0)
 SQUARE = Environment("square", ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)))
@@ -46,6 +51,29 @@ def test_the_range_includes_narrow_peaks_inside_the_bounds():
     low, high = compute_density_range(Gaussians((peak, peak_outside), 0.5), BOUNDS)
     assert low == pytest.approx(0.5)
     assert high == pytest.approx(7.5)
+
+
+@pytest.mark.parametrize("bounds", [(0.0, 0.0, 400.0, 1.0), (0.0, 0.0, 1.0, 400.0)], ids=["wide", "high"])
+def test_the_range_is_known_for_a_long_narrow_map(bounds):
+    density = Raster(np.array([[1.0, 2.0], [4.0, 5.0]]), bounds)
+    low, high = compute_density_range(density, bounds)
+    assert 1.0 <= low < high <= 5.0
+
+
+def test_an_edge_between_distant_corners_is_shaded_where_it_is():
+    corners = np.array([[0.0, 0.0], [200.0, 0.0], [0.0, 100.0]])
+    density = WeightedPolygons((WeightedArea(((40.0, 80.0), (41.0, 80.0), (40.0, 81.0)), 0.2),))
+    # The middle of the view is on the longest edge.
+    camera = Camera((40.0, 80.0), 1000.0, (0.0, 0.0, 200.0, 100.0))
+    surface = pygame.Surface((200, 100))
+    surface.fill(LIGHT.background)
+    canvas = Canvas(surface, camera, LIGHT, 1.0, choose_robot_hues(0))
+    draw_density_shading(canvas, density, corners)
+    is_shaded = (pygame.surfarray.array3d(surface) != np.array(LIGHT.background)).any(axis=2)
+    x, y = np.meshgrid(np.arange(200) + 0.5, np.arange(100) + 0.5, indexing="ij")
+    distance_below_edge = (y - 50.0) - (x - 100.0) / 2.0
+    assert is_shaded[distance_below_edge > 2.0].all()
+    assert not is_shaded[distance_below_edge < -2.0].any()
 
 
 def test_the_range_of_a_map_without_density_is_one():

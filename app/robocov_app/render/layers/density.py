@@ -11,6 +11,7 @@ from robocov.density import Density
 from robocov.typing import FloatArray
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.clipping import clip_polygon, limit_pixels
 from robocov_app.render.density_shading import Bounds, color_density, compute_density_fractions
 from robocov_app.render.density_text import describe_density
 from robocov_app.render.pixel_arrays import build_surface, convert_axes_to_world
@@ -18,8 +19,6 @@ from robocov_app.render.scene import Scene
 
 _MAX_SAMPLES = 60_000
 """Maximum number of density samples on a surface; values between samples are interpolated."""
-_MAX_PIXEL = 30_000
-"""Coordinates are limited to what pygame can fill."""
 _SYMBOL_WIDTH_PX = 20
 _SYMBOL_HEIGHT_PX = 11
 
@@ -53,8 +52,8 @@ def draw_density_shading(canvas: Canvas, density: Density, outline: FloatArray) 
     page = build_surface(_build_premultiplied_table(canvas.theme)[fractions])
     mask = pygame.Surface(box.size, pygame.SRCALPHA, 32)
     corners = canvas.camera.to_pixels(outline) - np.array(box.topleft)
-    limited = np.clip(corners, -_MAX_PIXEL, _MAX_PIXEL)
-    pygame.draw.polygon(mask, (255, 255, 255, 255), np.rint(limited).tolist())
+    for ring in clip_polygon(corners):
+        pygame.draw.polygon(mask, (255, 255, 255, 255), np.rint(ring).tolist())
     page.blit(mask, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
     canvas.surface.blit(page, box.topleft, special_flags=pygame.BLEND_PREMULTIPLIED)
 
@@ -63,8 +62,7 @@ def _find_box(canvas: Canvas, bounds: Bounds) -> pygame.Rect:
     """Return the part of bounds, m, that is inside the clip of the surface, px."""
     low_x, low_y, high_x, high_y = bounds
     ends = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-    limited = np.clip(ends, -_MAX_PIXEL, _MAX_PIXEL).astype(int).tolist()
-    (left, top), (right, bottom) = limited
+    (left, top), (right, bottom) = limit_pixels(ends).astype(int).tolist()
     box = pygame.Rect(left - 1, top - 1, right - left + 3, bottom - top + 3)
     return box.clip(canvas.surface.get_clip())
 
