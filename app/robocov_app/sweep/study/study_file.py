@@ -452,7 +452,8 @@ def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> li
     Raises
     ------
     InputError
-        If there is no bundled map of this name, no file matches the pattern, or the pattern is absolute.
+        If there is no bundled map of this name, no file matches the pattern, the pattern is absolute, or it
+        contains "**" next to other characters.
     """
     if entry in bundled:
         return [(entry, bundled[entry])]
@@ -464,6 +465,8 @@ def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> li
         return [(path.stem, path)]
     if Path(entry).is_absolute():
         raise InputError(f"expected a pattern relative to the study file, got {quote(entry)}")
+    if any("**" in part and part != "**" for part in Path(entry).parts):
+        raise InputError(f'expected "**" only in place of folders, such as "**/*.json", got {quote(entry)}')
     matches = sorted(folder.glob(entry))
     if not matches:
         raise InputError(f"expected a pattern that matches at least one file, got {quote(entry)}")
