@@ -18,7 +18,7 @@ from sample_sessions import HALL, LLOYD, RAPF, advance_session, advance_with_cos
 from session_records import build_record, have_same_arrays, select_present_branch
 
 from robocov.environment import CircleObstacle
-from robocov.errors import OutputError
+from robocov.errors import OutputError, ParameterError
 from robocov.metrics import compute_path_lengths
 from robocov.record import Record
 from robocov_app.cli import main
@@ -86,6 +86,12 @@ def test_a_branch_is_saved_with_its_parts_costs_and_video(
     assert {row.split(",")[0] for row in rows[1:]} == {"rapf", "lloyd"}
     assert (out / "comparison.mp4").stat().st_size > 1000
     assert load_session(out / "session.robocov").step == session.timeline.step
+
+
+def test_branches_without_a_name_are_not_found_by_an_empty_name() -> None:
+    document = build_branched_session().timeline.document
+    with pytest.raises(ParameterError, match=r"branch: expected one of 1 \(.*\), got ''"):
+        document.find_branch("")
 
 
 @pytest.mark.slow

@@ -257,7 +257,8 @@ class SessionDocument:
         """
         branches = self.list_branches()
         for number, branch in enumerate(branches, 1):
-            if name in (branch.node.name, str(number)):
+            # The name of a branch is empty if it has none.
+            if name and name in (branch.node.name, str(number)):
                 return branch
         known = ", ".join(f"{number} ({branch.description})" for number, branch in enumerate(branches, 1))
         raise ParameterError(f"branch: expected one of {known}, got {name!r}")
