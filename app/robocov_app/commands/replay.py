@@ -184,7 +184,7 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
     for folder in (options.run, *(saved.folder for saved in saved_runs)):
         # Writing the video must not replace the run itself.
         if Path(os.path.realpath(folder)).is_relative_to(os.path.realpath(out)):
-            raise InputError(f"--out: {out}: expected a folder other than that of the run")
+            raise InputError(f"--out: {out}: expected a folder that does not contain the run")
     runs = []
     roster_runs = []
     for saved in saved_runs:

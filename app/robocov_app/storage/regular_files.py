@@ -8,7 +8,7 @@ from robocov.errors import MapError, describe_error, to_one_line
 def require_regular_file(path: Path) -> None:
     """Raise MapError if a path is a broken link, or a pipe or device, which would block the window.
 
-    A path that does not exist passes, because reading it raises an error anyway. So does a folder.
+    A folder, or a path that does not exist, passes: reading it raises an error anyway.
     """
     try:
         exists = path.exists()

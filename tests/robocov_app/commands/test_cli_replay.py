@@ -122,7 +122,7 @@ def test_frames_are_never_saved_in_the_folder_of_the_run(run: Path, both: Path, 
     for source, out in ((run, run), (run, run.parent), (both, both / "lloyd"), (both / "lloyd", both)):
         arguments = ("--frames", *SMALL, "--overwrite", "--out", str(out))
         assert read_error(capsys, "replay", str(source), *arguments).endswith(
-            "expected a folder other than that of the run"
+            "expected a folder that does not contain the run"
         )
     assert (run / "record.npz").exists()
     assert (both / "lloyd" / "record.npz").exists()

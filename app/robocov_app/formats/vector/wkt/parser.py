@@ -257,7 +257,7 @@ class WktParser:
         return points[:, :2]
 
     def _raise_points_error(self) -> NoReturn:
-        """Raise MapError at the first character that follows which does not belong to a list of points."""
+        """Raise MapError for the first error in the list of points that follows."""
         scanner = self._scanner
         scanner.expect("(")
         end = len(scanner.text)
