@@ -169,10 +169,14 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("model (\n", ":1: expected a \\) to close this bracket"),
+        ("model (\n", ":1: expected a \\) to close this bracket, got the end of the file"),
         ("model ( )\n)", ":2: expected the name of a model"),
-        ("model ( pose [1 2 0 0 )", ":1: expected a \\] after its values"),
-        ("model ( pose [1 x 0 0] )", ":1: expected a value"),
+        ("model (\n] )", ":2: expected the name of a model or a property, or \\), got ']'"),
+        ("model ( pose [1 2 0 0 )", ":1: expected a \\] after the values of 'pose', got '\\)'"),
+        ("model ( pose [1 2 0 0", ":1: expected a \\] after the values of 'pose', got the end of the file"),
+        ("model ( pose [1 x 0 0] )", ":1: expected a value of 'pose', got 'x'"),
+        ("model size [1 1 1]", ":1: expected a value or \\( after 'model', got 'size'"),
+        ("model", ":1: expected a value or \\( after 'model', got the end of the file"),
         ('model ( size ["a" 1] )', ":1: expected numbers from -1e7 to 1e7"),
         ("model ( size [0 1] )", ":1: size: expected a number from"),
         ("model ( ) ~", ":1: expected a word, a number or a bracket"),
@@ -190,7 +194,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
             "expected at most 10000 models and blocks, got more",
         ),
     ],
-    ids=range(17),
+    ids=range(21),
 )
 def test_mistakes_are_reported_with_the_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "hall.world"

@@ -125,7 +125,7 @@ class _EntityParser:
             if depth and token.kind == ")":
                 return
             if token.kind != "word":
-                closing = ", or )," if depth else ""
+                closing = ", or )" if depth else ""
                 token.raise_error(f"the name of a model or a property{closing}")
             if token.text == "define" and self._is_at_macro():
                 self._parse_macro(token, depth)
@@ -137,7 +137,7 @@ class _EntityParser:
             else:
                 entity.properties[token.text] = self._parse_values(token)
         if depth:
-            Token("", "the end of the file", entity.location).raise_error("a ) to close this bracket")
+            raise MapError(f"{entity.location}: expected a ) to close this bracket, got the end of the file")
 
     def _peek_kind(self, index: int) -> str:
         """Return the kind of the token at an index from here on, or an empty string past the end."""
@@ -160,13 +160,24 @@ class _EntityParser:
 
     def _parse_values(self, name: Token) -> list[str]:
         """Return the values of a property; an empty list gives one empty string."""
-        values = [self._tokens.popleft()] if self._tokens else [name]
+        expected = f"a value or ( after {quote(name.text)}"
+        values = [self._take_token(name, expected)]
         if values[0].kind == "[":
+            expected = f"a value of {quote(name.text)}"
             values = []
             while self._tokens and self._tokens[0].kind not in BRACKETS:
                 values.append(self._tokens.popleft())
-            if not self._tokens or self._tokens.popleft().text != "]":
-                name.raise_error("a ] after its values")
-        if not all(value.kind in ("number", "string") for value in values):
-            name.raise_error("a value, or ( and ), after it")
+            expected_end = f"a ] after the values of {quote(name.text)}"
+            end = self._take_token(name, expected_end)
+            if end.kind != "]":
+                end.raise_error(expected_end)
+        for value in values:
+            if value.kind not in ("number", "string"):
+                value.raise_error(expected)
         return [value.text for value in values] or [""]
+
+    def _take_token(self, name: Token, expected: str) -> Token:
+        """Remove and return the next token; at the end of the file, raise MapError with the line of a name."""
+        if not self._tokens:
+            raise MapError(f"{name.location}: expected {expected}, got the end of the file")
+        return self._tokens.popleft()
