@@ -116,6 +116,6 @@ def _build_document(value: Any) -> Any:
         obstacles = [value]
     are_obstacles = obstacles and all(isinstance(obstacle, dict) for obstacle in obstacles)
     if not are_obstacles:
-        require(len(obstacles) >= 3, "expected at least three points, obstacles or a map")
+        require(len(obstacles) >= 3, "expected a map, obstacles or at least three points")
         obstacles = [{"kind": "polygon", "vertices": obstacles}]
     return {**HEADER, "obstacles": obstacles}
