@@ -177,7 +177,7 @@ class _EntityParser:
         return [value.text for value in values] or [""]
 
     def _take_token(self, name: Token, expected: str) -> Token:
-        """Remove and return the next token; at the end of the file, raise MapError with the line of a name."""
+        """Return and remove the next token, which follows a name; raise MapError at the end of the file."""
         if not self._tokens:
             raise MapError(f"{name.location}: expected {expected}, got the end of the file")
         return self._tokens.popleft()
