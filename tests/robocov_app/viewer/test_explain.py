@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from robot_reports import assert_consistent, assert_forces_sum_up, build_report,
 from robocov import Rapf, Simulation, Team
 from robocov.observation import Decision
 from robocov.voronoi import partition
-from robocov_app.viewer.explanation.explain import explain
+from robocov_app.viewer.explanation.explain import explain, explain_robot
 from robocov_app.viewer.explanation.quantities import format_direction, format_force, format_length
 from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
 
@@ -430,3 +431,10 @@ def draw_arguments(draw):
 @given(draw_arguments())
 def test_reports_of_random_snapshots_are_consistent(arguments):
     assert_consistent(build_report(**arguments))
+
+
+def test_the_position_of_a_failed_robot_has_no_negative_zero():
+    setup = SimpleNamespace(failed={2: (-0.001, 3.0)})
+    session = SimpleNamespace(displayed=SimpleNamespace(get_setup=lambda pane: setup))
+    report = explain_robot(SimpleNamespace(session=session, pane=None), 2)
+    assert report.verdict.startswith("failed: it stays at (0.00, 3.00) m")

@@ -49,7 +49,7 @@ def explain_robot(viewer: Presenter, number: int) -> RobotReport:
     setup = displayed.get_setup(pane)
     if number in setup.failed:
         x, y = setup.failed[number]
-        verdict = f"failed: it stays at ({x:.2f}, {y:.2f}) m, and the others sense it as an obstacle"
+        verdict = f"failed: it stays at ({x:z.2f}, {y:z.2f}) m, and the others sense it as an obstacle"
         return RobotReport(f"Robot {number}", verdict, ())
     return explain(
         displayed.get_snapshot(pane),
