@@ -71,7 +71,7 @@ def test_the_reference_does_not_depend_on_the_starts():
 @pytest.mark.slow
 def test_the_error_names_a_map_without_space(tmp_path):
     closet = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)), ())
-    with pytest.raises(OutputError, match=r"reference of map 'closet': radius: no space for a robot of radius"):
+    with pytest.raises(OutputError, match=r"reference of map 'closet': radius: no space for a robot"):
         search(tmp_path, maps=(StudyMap("closet", closet),), radius=0.6)
 
 
