@@ -244,16 +244,19 @@ def test_ctrl_c_after_the_last_step_does_not_limit_the_samples_of_the_cost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     save = Record.save
+    interrupted_folders: list[Any] = []
 
-    def interrupt_and_save(self: Record, *arguments: Any, **options: Any) -> None:
-        if not arguments[1:]:  # the record without a summary, which is saved before the evaluation
+    def interrupt_and_save(self: Record, folder: Any, *arguments: Any, **options: Any) -> None:
+        if not interrupted_folders:  # The record is saved for the first time before the evaluation.
+            interrupted_folders.append(folder)
             signal.raise_signal(signal.SIGINT)
-        save(self, *arguments, **options)
+        save(self, folder, *arguments, **options)
 
     monkeypatch.setattr(execution, "MAX_SAMPLES_AFTER_INTERRUPTION", 3)
     monkeypatch.setattr(Record, "save", interrupt_and_save)
     out = tmp_path / "out"
     assert main([*RUN, "--out", str(out)]) == 0
+    assert interrupted_folders
     output = capsys.readouterr().out
     assert f"saved in {out}" in output and "Interrupted" not in output
     assert len((out / "cost.csv").read_text().splitlines()) > 10
