@@ -45,21 +45,24 @@ def hide_undelivered(observations: list[Observations], robot: int, seed: int) ->
     return [hide_others(seen, robot, substitutes) for seen in observations]
 
 
-def remove_messages(
-    observations: list[Observations], kinds: tuple[type, ...], density: Density
-) -> list[Observations]:
-    """Return observations without messages whose payloads are of these kinds.
+def replace_density_sensor(observations: list[Observations], density: Density) -> list[Observations]:
+    """Return observations in which robots can measure the density everywhere, also where they have not been.
 
-    Robots may then measure the density also where they did not before.
+    A controller that decides differently needs this, because it may measure elsewhere.
     """
     sensor = DensitySensor(lambda robots, points: density.evaluate(points))
+    return [replace(seen, density_sensor=sensor) for seen in observations]
+
+
+def remove_messages(observations: list[Observations], kinds: tuple[type, ...]) -> list[Observations]:
+    """Return observations without messages whose payloads are of these kinds."""
     changed = []
     for seen in observations:
         messages = [
             [message for message in inbox if not isinstance(message.payload, kinds)]
             for inbox in seen.messages
         ]
-        changed.append(replace(seen, messages=messages, density_sensor=sensor))
+        changed.append(replace(seen, messages=messages))
     return changed
 
 

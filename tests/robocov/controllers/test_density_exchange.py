@@ -13,6 +13,7 @@ from message_replay import (
     hide_undelivered,
     record_run,
     remove_messages,
+    replace_density_sensor,
     replay,
 )
 from property_examples import count_examples
@@ -182,6 +183,8 @@ def test_robots_learn_a_density_from_delivered_messages_only(name: str, seed: in
     decided = extract_robot_decisions(decisions, robot)
     received = hide_undelivered(observations, robot, seed)
     assert extract_robot_decisions(replay(simulation, received), robot) == decided
-    silent = remove_messages(received, (Measurements, np.ndarray), HOT)
+    measurable = replace_density_sensor(received, HOT)
+    assert extract_robot_decisions(replay(simulation, measurable), robot) == decided
+    silent = remove_messages(measurable, (Measurements, np.ndarray))
     goals = [goal for _, goal, _ in extract_robot_decisions(replay(simulation, silent), robot)]
     assert goals != [goal for _, goal, _ in decided]
