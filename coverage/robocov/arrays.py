@@ -44,7 +44,11 @@ def to_tuples(values: Any) -> Any:
     if isinstance(values, np.ndarray):
         return to_tuples(values.tolist())
     if isinstance(values, list | tuple):
-        return tuple(to_tuples(value) for value in values)
+        try:
+            hash(values)
+        except TypeError:
+            return tuple(to_tuples(value) for value in values)
+    # Hashable values contain no arrays and no lists.
     return values
 
 

@@ -101,7 +101,7 @@ CORRECTIONS = (
     "Results of early development versions cannot be compared with those of this version. Robots with shared "
     "maps read the maps of all robots in range, whether or not messages arrived, so results on the track "
     "Lossy were not valid. The cost included space behind gaps that are too narrow for a robot. Since then, "
-    "faults of some controllers were mended, and our own controllers explore less. The page “Submit to the "
+    "faults of some controllers were fixed, and our own controllers explore less. The page “Submit to the "
     "benchmark” of the handbook lists all corrections, with figures before and after."
 )
 """Summary of the section "Corrections" of the handbook."""

@@ -330,7 +330,7 @@ class _Search:
     def _spread_candidates(self, covered: list[int]) -> list[FloatArray]:
         """Return the candidate positions in each of the covered components, (c, 2) m each.
 
-        There may be fewer than robots only if the robots do not fit.
+        There are fewer candidates than robots only if the robots do not fit.
         """
         areas = [self.space.components[k] for k in covered]
         total_area = sum(area.area for area in areas)

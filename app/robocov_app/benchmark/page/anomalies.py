@@ -56,7 +56,6 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
         if key in rapf_costs
     }
     better_tracks = _find_better_tracks(ratios)
-    is_clearly_better = bool(ratios) and np.median(list(ratios.values())) < CLEARLY_BETTER_RATIO
     anomalies = []
     for row in result["rows"]:
         if "error" in row:
@@ -65,7 +64,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
         ratio = ratios.get((track, get_run_key(row)), 0.0)
         if row["path_length_m"] < MIN_PATH_LENGTH_M:
             reason = "at rest from the start"
-        elif ratio > MAX_RAPF_RATIO and (is_clearly_better or track in better_tracks):
+        elif ratio > MAX_RAPF_RATIO and track in better_tracks:
             reason = f"cost more than {MAX_RAPF_RATIO:g} times that of RAPF"
         else:
             continue
@@ -83,8 +82,10 @@ def _collect_costs(rows: Sequence[Mapping[str, Any]]) -> _RunValues:
 
 
 def _find_better_tracks(ratios: _RunValues) -> set[str]:
-    """Return the tracks on which the median ratio of the costs to those of RAPF is below 1."""
+    """Return the tracks on which a controller with these ratios of costs is expected to beat RAPF."""
     ratios_by_track: dict[str, list[float]] = {}
     for (track, _), ratio in ratios.items():
         ratios_by_track.setdefault(track, []).append(ratio)
+    if ratios and np.median(list(ratios.values())) < CLEARLY_BETTER_RATIO:
+        return set(ratios_by_track)
     return {track for track, values in ratios_by_track.items() if np.median(values) < 1.0}

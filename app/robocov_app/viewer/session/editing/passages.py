@@ -77,7 +77,7 @@ def _find_occupied_components(components: np.ndarray, positions: np.ndarray, rad
 
 
 def _split_components(before: Environment, components_after: np.ndarray, radius: float) -> list[IntArray]:
-    """Return into which components an edit splits each component of the free positions.
+    """Find the components into which an edit splits each component of the free positions.
 
     Returns
     -------

@@ -205,13 +205,16 @@ class Trail:
                 self._append_rows(later.positions[rows], later.times[rows])
 
     def _remove_last_row(self) -> None:
-        """Remove the last row, and the starts of robots that are in no other row."""
+        """Remove the last row.
+
+        Robots that are in no other row get a new start with their next row: an edit may have moved them.
+        """
         self._count -= 1
         self._section_start = min(self._section_start, self._count)
         is_absent: BoolArray = np.all(np.isnan(self.positions[..., 0]), axis=0)
         for number in compress(self.numbers, is_absent):
-            self._starts.pop(number, None)
-        self._start_arrays = {}
+            if self._starts.pop(number, None) is not None:
+                self._start_arrays = {}
 
     def _append_rows(self, positions: FloatArray, times: FloatArray) -> None:
         while self._count + len(times) > len(self._times):
