@@ -4,7 +4,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, quote, to_floats
 from robocov.team import Team
 from robocov.typing import FloatArray
 
@@ -112,13 +112,10 @@ def check_actions(actions: Any, count: int) -> FloatArray:
     ParameterError
         If the actions are not numbers, have the wrong shape, or are not finite.
     """
-    try:
-        array = np.asarray(actions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        expected = f"expected actions of shape {(count, 2)}"
-        raise ParameterError(f"{expected}, got {quote(actions)}") from error
+    expected = f"an array of shape {(count, 2)}"
+    array = to_floats("actions", actions, expected)
     if array.shape != (count, 2):
-        raise ParameterError(f"expected actions of shape {(count, 2)}, got {array.shape}")
+        raise ParameterError(f"actions: expected {expected}, got one of shape {array.shape}")
     is_finite = np.isfinite(array).all(axis=1)
     if not is_finite.all():
         robot = int(np.flatnonzero(~is_finite)[0])

@@ -1,7 +1,6 @@
 """Environment with one learner for each robot: a PettingZoo parallel environment."""
 
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from itertools import compress
 from typing import Any, TypeAlias, TypeVar
 
@@ -10,7 +9,7 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, quote, to_floats
 from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
@@ -187,9 +186,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
                 continue
             if agent not in actions:
                 raise ParameterError(f"actions: expected one for each agent, got none for {agent}")
-            action = np.empty(0)
-            with suppress(TypeError, ValueError):
-                action = np.asarray(actions[agent], dtype=np.float64)
+            action = to_floats(f"action of {agent}", actions[agent], "two finite numbers")
             if action.shape != (2,) or not np.isfinite(action).all():
                 raise ParameterError(
                     f"action of {agent}: expected two finite numbers, got {quote(actions[agent])}"

@@ -47,7 +47,8 @@ def note_interrupts() -> Iterator[None]:
 def suppress_controller_errors() -> Iterator[None]:
     """Suppress all exceptions of a user's controller in the context, but not the user's Ctrl+C.
 
-    A controller may raise any exception, even `SystemExit` or a `KeyboardInterrupt` of its own.
+    A controller may raise any exception, even `SystemExit` or a `KeyboardInterrupt` of its own. Ctrl+C can be
+    told from the latter only within `note_interrupts` or `Interruption`; elsewhere, it is suppressed, too.
     """
     try:
         yield

@@ -190,12 +190,12 @@ def test_obstacles_are_clipped_to_the_boundary():
     ]
     sketch, _ = Sketch(boundary=HALL).with_obstacles(shapes)
     change = boolean.clip_to_boundary(sketch, Selection())
-    assert change.description == "2 obstacles cut off at the boundary"
+    assert change.description == "1 obstacle clipped to the boundary, 1 obstacle outside the boundary removed"
     inside, half = change.sketch.obstacles
     assert inside is sketch.obstacles[0]
     assert half.shape.polygon.area == pytest.approx(np.pi / 2, abs=5e-3)
     assert shapely.Polygon(HALL).covers(half.geometry)
-    with pytest.raises(MapError, match="nothing sticks out"):
+    with pytest.raises(MapError, match="no obstacle extends beyond the boundary"):
         boolean.clip_to_boundary(change.sketch, Selection())
     with pytest.raises(MapError, match="boundary must be valid"):
         boolean.clip_to_boundary(replace(sketch, boundary=None), Selection())

@@ -229,7 +229,9 @@ def test_each_episode_has_its_own_seed_of_conditions(empty: Environment) -> None
 
 def test_invalid_actions_and_options_are_rejected(empty: Environment) -> None:
     episode = start_episode(empty)
-    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \(2, 2\)"):
+    with pytest.raises(
+        ParameterError, match=r"actions: expected an array of shape \(3, 2\), got one of shape \(2, 2\)"
+    ):
         episode.advance(np.zeros((2, 2)))
     with pytest.raises(ParameterError, match=r"action of robot_2: expected finite numbers"):
         episode.advance(np.array([[0.0, 0.0], [np.nan, 0.0], [0.0, 0.0]]))

@@ -122,11 +122,15 @@ def test_steps_before_a_reset_and_invalid_actions_are_rejected() -> None:
     with pytest.raises(RobocovError, match=r"call reset\(\) first"):
         env.step(env.action_space.sample())
     env.reset(seed=0)
-    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \(6,\)"):
+    with pytest.raises(
+        ParameterError, match=r"actions: expected an array of shape \(3, 2\), got one of shape \(6,\)"
+    ):
         env.step(np.zeros(6))
-    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \[\[1, 2\], \[3\]\]"):
+    with pytest.raises(
+        ParameterError, match=r"actions: expected an array of shape \(3, 2\), got \[\[1, 2\], \[3\]\]"
+    ):
         env.step([[1, 2], [3]])
-    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got 'ab'"):
+    with pytest.raises(ParameterError, match=r"actions: expected an array of shape \(3, 2\), got 'ab'"):
         env.step("ab")
     vector_env = CoverageVectorEnv(num_envs=2, **SMALL)
     vector_env.reset(seed=0)
@@ -134,7 +138,9 @@ def test_steps_before_a_reset_and_invalid_actions_are_rejected() -> None:
         vector_env.step(np.zeros((1, 3, 2)))
     with pytest.raises(ParameterError, match="actions: expected one array for each of 2 environments, got 3"):
         vector_env.step(3)
-    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \[\[1, 2\], \[3\]\]"):
+    with pytest.raises(
+        ParameterError, match=r"actions: expected an array of shape \(3, 2\), got \[\[1, 2\], \[3\]\]"
+    ):
         vector_env.step([np.zeros((3, 2)), [[1, 2], [3]]])
 
 

@@ -83,7 +83,7 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
 
 
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
-    """Cut off the parts of the selected obstacles outside the boundary, or of all if none is selected."""
+    """Clip the selected obstacles to the boundary, or all obstacles if none is selected."""
     if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be valid first")
     inside = shapely.Polygon(sketch.boundary)
@@ -96,8 +96,15 @@ def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
         if not inside.covers(item.geometry):
             remainder = _intersection(item.geometry, inside)
             shapes[item.key] = extract_polygons(remainder, item.shape.name, item.shape.path)
-    require(shapes, "nothing sticks out of the boundary")
-    description = f"{format_count(len(shapes), 'obstacle')} cut off at the boundary"
+    require(shapes, "no obstacle extends beyond the boundary")
+    clipped_count = sum(map(bool, shapes.values()))
+    removed_count = len(shapes) - clipped_count
+    facts = []
+    if clipped_count:
+        facts.append(f"{format_count(clipped_count, 'obstacle')} clipped to the boundary")
+    if removed_count:
+        facts.append(f"{format_count(removed_count, 'obstacle')} outside the boundary removed")
+    description = ", ".join(facts)
     return replace_obstacles(sketch, shapes, description)
 
 

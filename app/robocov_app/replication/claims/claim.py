@@ -274,7 +274,8 @@ def derive_verdict(
 
     met = [result for result in results if result.is_met]
     refuted = [result for result in results if result.is_met is False]
-    if met and len(met) == len(results) and (adjusted_p_value is None or adjusted_p_value <= ALPHA):
+    are_all_met = len(met) == len(results) > 0
+    if are_all_met and (adjusted_p_value is None or adjusted_p_value <= ALPHA):
         return "holds"
     if any(is_significant(result.p_value) for result in met):
         return "holds partly"
