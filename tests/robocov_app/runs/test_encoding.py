@@ -238,6 +238,15 @@ class TestSaveVideo:
         frames, _ = read_video(tmp_path / f"{name}.mp4")
         assert len(frames) == 3
 
+    def test_a_screen_video_without_encoder_process_leaves_no_file(self, tmp_path, monkeypatch):
+        def raise_memory_error(*arguments, **options):
+            raise OSError(errno.ENOMEM, "Cannot allocate memory")
+
+        monkeypatch.setattr("robocov_app.viewer.window.screen_video.Popen", raise_memory_error)
+        with pytest.raises(OutputError, match=r"screen.mp4: cannot be written: Cannot allocate memory"):
+            ScreenVideo(tmp_path / "screen.mp4", (64, 48))
+        assert list_names(tmp_path) == []
+
     def test_a_video_without_frames_is_rejected(self, tmp_path):
         with pytest.raises(ParameterError, match="frames"):
             save_video(tmp_path / "run.mp4", [])

@@ -43,7 +43,7 @@ class ScreenVideo:
     Raises
     ------
     OutputError
-        If there is no encoder, the folder cannot be created, or the file exists.
+        If there is no encoder or it cannot be started, the folder cannot be created, or the file exists.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], *, waits: bool = False) -> None:
@@ -59,7 +59,7 @@ class ScreenVideo:
             command = build_encoder_command(path, self._size, VIDEO_FPS, is_streamed=True)
             # Opening with "x" fails if the file exists, so that nothing is written through a symbolic link.
             path.open("xb").close()
-            self._process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
+            self._process = _start_encoder(command, path)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
         self._queue: queue.Queue[bytes | None] = queue.Queue(MAX_WAITING_FRAMES)
@@ -124,6 +124,15 @@ class ScreenVideo:
             # The encoder is gone. Empty the queue, so that `add` and `close` do not wait forever.
             while self._queue.get() is not None:
                 pass
+
+
+def _start_encoder(command: list[str], path: Path) -> Popen[bytes]:
+    """Start the encoder; if that fails, remove the empty file of the video."""
+    try:
+        return Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
+    except OSError:
+        path.unlink()
+        raise
 
 
 def _make_even(length: int) -> int:
