@@ -15,7 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.render.canvas import Canvas
-from robocov_app.viewer.chart.curves import map_curve_colors, simplify_points
+from robocov_app.viewer.chart.curves import (
+    GhostLine,
+    find_nearest_ghost,
+    map_curve_colors,
+    simplify_points,
+)
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.window.screen_video import copy_pixels
 
@@ -144,6 +149,17 @@ def test_values_of_the_past_are_shown_at_once(driver: Driver) -> None:
     assert not np.array_equal(
         copy_pixels(driver.window.screen)[top : top + height, width - 150 : width], live
     )
+
+
+def test_the_curve_of_a_branch_is_found_between_its_samples() -> None:
+    ghosts = [
+        GhostLine(3, np.array([[0.0, 0.0], [100.0, 0.0]])),
+        GhostLine(5, np.array([[0.0, 20.0], [100.0, 20.0]])),
+    ]
+    assert find_nearest_ghost(ghosts, np.array([50.0, 4.0]), reach=6.0) == 3
+    assert find_nearest_ghost(ghosts, np.array([50.0, 17.0]), reach=6.0) == 5
+    assert find_nearest_ghost(ghosts, np.array([50.0, 10.0]), reach=6.0) is None
+    assert find_nearest_ghost([], np.array([50.0, 10.0]), reach=6.0) is None
 
 
 def test_points_on_straight_sections_are_left_out() -> None:

@@ -98,10 +98,11 @@ def find_nearest_ghost(ghosts: Sequence[GhostLine], point: FloatArray, reach: fl
     int or None
         Number of the node; None if no curve is within reach.
     """
+    pointer = shapely.Point(point)
     nearest_node = None
     min_distance = reach
     for ghost in ghosts:
-        distance = float(np.hypot(*(ghost.points - point).T).min())
+        distance = shapely.LineString(ghost.points).distance(pointer)
         if distance < min_distance:
             min_distance = distance
             nearest_node = ghost.node
