@@ -21,6 +21,7 @@ from sample_sessions import (
 from robocov.environment import CircleObstacle
 from robocov.errors import StartError
 from robocov_app.viewer.session import pane_group as module
+from robocov_app.viewer.session.past.ghosts import MAX_GHOST_BRANCHES
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 
@@ -71,6 +72,18 @@ def test_a_branch_leaves_ghost_curves():
         assert pane.distance_curve.interpolate(session.displayed.time) == pytest.approx(2.5)
         assert pane.time == pytest.approx(0.5)
         assert pane.trail.times[-1] == pytest.approx(0.5)
+
+
+def test_only_the_newest_branches_have_ghost_curves():
+    session = start_session(RAPF)
+    advance_with_costs(session, 10)
+    for number in range(MAX_GHOST_BRANCHES + 3):
+        session.show_time(0.1)
+        session.set_properties(RobotProperties(max_speed=0.5 + 0.01 * number))
+        advance_with_costs(session, 4)
+    # The last node is that of the present branch.
+    newest = [node.number for node in session.timeline.document.nodes][-MAX_GHOST_BRANCHES - 1 : -1]
+    assert [ghost.node for ghost in session.timeline.ghosts] == newest
 
 
 def test_there_is_no_branch_at_the_present():

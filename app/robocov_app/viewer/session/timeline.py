@@ -146,9 +146,7 @@ class Timeline:
     def ghosts(self) -> list[GhostCurve]:
         """The curves of other branches."""
         if self._ghosts is None:
-            self._ghosts = build_ghost_curves(
-                self.document, self.head, self.step, self.scenario.dt, len(self.panes)
-            )
+            self._ghosts = build_ghost_curves(self.document, self.head, self.step, self.scenario.dt)
         return self._ghosts
 
     def require_reproducible(self) -> None:

@@ -1,5 +1,7 @@
 """Cost curves of the branches that are not displayed."""
 
+from itertools import chain
+
 import numpy as np
 
 from robocov_app.viewer.session.document import Branch, Node, SessionDocument
@@ -10,9 +12,7 @@ MAX_GHOST_BRANCHES = 8
 QUANTITIES = ("distance", "time")
 
 
-def build_ghost_curves(
-    document: SessionDocument, head: Node, step: int, dt: float, panes: int
-) -> list[GhostCurve]:
+def build_ghost_curves(document: SessionDocument, head: Node, step: int, dt: float) -> list[GhostCurve]:
     """Build the curves of the newest branches of the same run, other than the present branch.
 
     Parameters
@@ -24,8 +24,6 @@ def build_ghost_curves(
         The present step.
     dt : float, s
         Control period.
-    panes : int
-        Number of displayed panes.
 
     Returns
     -------
@@ -34,13 +32,14 @@ def build_ghost_curves(
     """
     last_steps = document.get_last_steps(head, step)
     root = document.get_path(head)[0]
-    ghosts = []
-    # The present branch adds no curves: no part of it is off the path to the present.
+    curves_of_branches = []
     for branch in document.list_branches():
         if document.get_path(branch.node)[0] is root:
-            ghosts += _build_branch_curves(document, branch, last_steps, dt)
-    max_curves = len(QUANTITIES) * MAX_GHOST_BRANCHES * panes
-    return ghosts[-max_curves:]
+            curves = _build_branch_curves(document, branch, last_steps, dt)
+            # The present branch has no curves: no part of it is off the path to the present.
+            if curves:
+                curves_of_branches.append(curves)
+    return list(chain.from_iterable(curves_of_branches[-MAX_GHOST_BRANCHES:]))
 
 
 def _build_branch_curves(
