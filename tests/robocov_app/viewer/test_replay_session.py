@@ -11,6 +11,8 @@ from drawn_run import record_walk
 from sample_sessions import HALL, LLOYD, RAPF, RPF, advance_session, get_positions, start_session
 from session_records import COUNTING, build_record, build_records, have_same_arrays
 
+from robocov import run
+from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
@@ -296,6 +298,21 @@ def test_uneven_times_are_rejected(record: Record) -> None:
 
 
 @pytest.mark.parametrize(
+    "conditions",
+    [
+        Conditions(failures=((1, 0.1), (2, 0.2))),
+        Conditions(failures=((1, 0.2),), joins=((2, 0.3, None),)),
+    ],
+    ids=["at the end", "for some time"],
+)
+def test_records_without_a_working_robot_are_rejected(conditions: Conditions) -> None:
+    record = run("square", "rapf", robots=2, duration=0.4, conditions=conditions)
+    expected = r"saved/0: expected a working robot at all times, got none at 0\.2 s; --frames"
+    with pytest.raises(InputError, match=expected):
+        replay(record)
+
+
+@pytest.mark.parametrize(
     "session_content",
     [
         {"robots": [1, 2], "failed": {}},
@@ -314,9 +331,15 @@ def test_session_content_that_contradicts_the_record_is_ignored(
 
 
 def test_dragged_robots_are_events(record: Record) -> None:
-    drags = [{"from_s": 0.1, "to_s": 0.2, "robots": [2, 3]}]
-    (event,) = replay(replace(record, session={"edits": drags})).timeline.events
-    assert (event.time, event.kind, event.text) == (0.2, "hand", "robot 2, 3 was dragged")
+    drags = [
+        {"from_s": 0.1, "to_s": 0.2, "robots": [2, 3]},
+        {"from_s": 0.1, "to_s": 0.3, "robots": [4]},
+    ]
+    events = replay(replace(record, session={"edits": drags})).timeline.events
+    assert [(event.time, event.kind, event.text) for event in events] == [
+        (0.2, "hand", "robots 2, 3 were dragged"),
+        (0.3, "hand", "robot 4 was dragged"),
+    ]
 
 
 # Comparisons

@@ -124,6 +124,11 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
         if not np.allclose(elapsed, even_times, rtol=_TIME_TOLERANCE, atol=tolerance):
             file = run.folder / RECORD_FILE
             raise InputError(f"{file}: time: expected times {record.dt:g} s apart")
+        idle_rows = np.flatnonzero(~record.is_working.any(axis=1))
+        if len(idle_rows):
+            time = record.time[idle_rows[0]]
+            reason = f"expected a working robot at all times, got none at {time:g} s"
+            raise InputError(f"{run.folder}: {reason}; --frames and --video show such runs")
         for name, value in _describe_run(record).items():
             if value != first[name]:
                 expected = f"expected {first[name]} as in {saved[0].folder}, got {value}"
@@ -188,7 +193,10 @@ def _list_drag_events(record: Record, dt: float) -> list[AutomaticEvent]:
     events = []
     for drag in record.session.get("edits", ()):
         numbers = ", ".join(map(str, drag["robots"]))
-        events.append(AutomaticEvent(round(drag["to_s"] / dt), "hand", f"robot {numbers} was dragged"))
+        text = f"robot {numbers} was dragged"
+        if len(drag["robots"]) > 1:
+            text = f"robots {numbers} were dragged"
+        events.append(AutomaticEvent(round(drag["to_s"] / dt), "hand", text))
     return events
 
 
