@@ -289,6 +289,29 @@ def test_the_message_says_that_the_process_of_a_run_was_killed(
     assert not target.exists()
 
 
+def test_the_user_is_told_of_a_run_that_is_still_being_saved_after_the_first_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start_process = subprocess.Popen
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def start_quick_and_then_slow_process(command: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        seconds = len(processes)
+        process = start_process([sys.executable, "-c", f"import time; time.sleep({seconds})"], **options)
+        processes.append(process)
+        return process
+
+    module = "robocov_app.viewer.session.files.run_saver"
+    monkeypatch.setattr(f"{module}.subprocess.Popen", start_quick_and_then_slow_process)
+    monkeypatch.setattr(f"{module}.FIRST_WAIT_S", 0.05)
+    saver = RunSaver(16)
+    for _ in range(2):
+        saver.save(start_session(RAPF), tmp_path)
+    processes[0].wait()
+    saver.finish()
+    assert capsys.readouterr().err == "saving runs; press Ctrl+C to cancel\n"
+
+
 def test_the_path_length_excludes_placing_a_robot() -> None:
     session = advance_session(start_session(RAPF), 12)
     session.apply(PlaceRobot(2, (5.0, 3.0)), "hand", "robot 2 placed")

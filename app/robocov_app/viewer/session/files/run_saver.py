@@ -122,11 +122,13 @@ class RunSaver:
     def finish(self) -> None:
         """Wait until all runs are saved; if the wait is interrupted, kill the processes."""
         try:
-            for index, job in enumerate(self._jobs):
+            has_told_user = False
+            for job in self._jobs:
                 with suppress(subprocess.TimeoutExpired):
                     job.process.wait(FIRST_WAIT_S)
-                if index == 0 and job.process.poll() is None:
+                if not has_told_user and job.process.poll() is None:
                     echo("saving runs; press Ctrl+C to cancel", to_stderr=True)
+                    has_told_user = True
                 job.process.wait()
         except BaseException:
             for job in self._jobs:
