@@ -127,9 +127,16 @@ class TestEdits:
                 lambda: density_edits.set_weight(build_dense_map(), 0, float("nan")),
                 "weight: expected .*, got nan",
             ),
-            (lambda: density_edits.set_weight(build_dense_map(), 0, 1e9), "weight: expected .*, got 1e"),
+            (
+                lambda: density_edits.set_weight(build_dense_map(), 0, 1e9),
+                r"weight: expected a number from 0\.000001 to 1000000, got 1e",
+            ),
+            (
+                lambda: density_edits.set_floor(build_dense_map(), 1e9),
+                "floor: expected a number from 0 to 1000000, got 1e",
+            ),
             (lambda: density_edits.move_feature(build_dense_map(), 5, 1.0, 1.0), "hot spot no longer exists"),
-            (lambda: density_edits.set_floor(build_sheet(), 0.0), "weight: expected .*, got 0"),
+            (lambda: density_edits.set_floor(build_sheet(), 0.0), "floor: expected .*, got 0"),
             (
                 lambda: density_edits.add_peak(build_dense_map(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0),
                 "is a polygons",

@@ -8,7 +8,7 @@ import shapely
 
 from robocov.density import MAX_WEIGHT, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Point, PolygonObstacle
-from robocov.errors import MapError, format_count
+from robocov.errors import MapError, format_bound, format_count
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
@@ -128,7 +128,7 @@ def set_floor(sketch: Sketch, floor: float) -> Change:
     minimum = MIN_PEAK_WEIGHT
     if features:
         minimum = 0.0
-    floor = _round_weight(floor, minimum)
+    floor = _round_weight(floor, minimum, name="floor")
     return _set_features(sketch, features, f"the weight is at least {floor:g} everywhere", floor)
 
 
@@ -143,7 +143,7 @@ def parse_weight(text: str) -> float:
     try:
         weight = float(text)
     except ValueError:
-        raise MapError(f"expected a weight above 0, got “{text}”") from None
+        raise MapError(f"weight: expected a number, got “{text}”") from None
     return _round_weight(weight, MIN_PEAK_WEIGHT)
 
 
@@ -241,8 +241,8 @@ def _round_sigma(sigma: float) -> float:
     return round_length(sigma)
 
 
-def _round_weight(weight: float, minimum: float) -> float:
+def _round_weight(weight: float, minimum: float, *, name: str = "weight") -> float:
     if not minimum <= weight <= MAX_WEIGHT:
-        bound = "above" if minimum else "from"
-        raise MapError(f"weight: expected a number {bound} 0, got {weight:g}")
+        limits = f"{format_bound(minimum)} to {format_bound(MAX_WEIGHT)}"
+        raise MapError(f"{name}: expected a number from {limits}, got {weight:g}")
     return round(float(weight), WEIGHT_DECIMALS)
