@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from driven_editor import EditorDriver, build_sheet, open_editor
 
-from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.tools.handles import find_handle, list_handles, list_vertex_owners
@@ -98,6 +98,20 @@ def test_a_drag_takes_a_typed_distance(driver: EditorDriver) -> None:
     driver.press_key("return")
     driver.release()
     assert driver.shapes[0].vertices[0] == (2.25, 1.5)
+
+
+def test_a_size_cannot_be_typed_for_a_selection_without_that_size(tmp_path: Path) -> None:
+    starts = (("column", PointsStart(((6, 2), (6, 4)))),)
+    with open_editor(tmp_path, build_sheet(starts=starts)) as driver:
+        driver.select("column")
+        driver.press(*find_handle_pixel(driver, "scale", (1, 0)))
+        driver.move_to((7, 3), (8, 3), held=1)
+        driver.type("2")
+        driver.press_key("return")
+        assert driver.message == "The selection has no width that can be scaled"
+        driver.press_key("escape")
+        driver.release()
+        assert driver.sketch.starts == starts
 
 
 def test_a_vertex_is_dragged_alone_and_several_together(driver: EditorDriver) -> None:

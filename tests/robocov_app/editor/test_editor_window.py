@@ -87,6 +87,10 @@ def test_the_object_page_edits_names_positions_and_sizes(driver: EditorDriver) -
     driver.type_into("wide", "120cm")
     driver.press_key("return")
     assert driver.sketch.get_item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
+    driver.type_into("wide", "0")
+    driver.press_key("return")
+    assert driver.message.startswith("Expected a width from ")
+    assert driver.sketch.get_item(0).geometry.bounds == (3.5, 2.0, 4.7, 4.0)
     driver.type_into("note", "oak")
     driver.press_key("return")
     assert driver.sketch.get_item(0).note == "oak"

@@ -292,6 +292,8 @@ class ScaleDrag(Drag):
         # The text is the width, unless only the height changes with this handle.
         axis = 0 if self._side[0] else 1
         length = self._bounds[2 + axis] - self._bounds[axis]
+        name = ("width", "height")[axis]
+        require(length > NO_MOVE_M, f"the selection has no {name} that can be scaled")
         factor = parse_length(text, now=length) / length
         require(factor > 0.0, f"“{text}”: expected a size above 0")
         factors = [1.0, 1.0]

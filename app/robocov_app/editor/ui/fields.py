@@ -113,18 +113,18 @@ def _parse_step(text: str, current: float) -> float:
 
 def _write_width(editor: Editor, text: str) -> None:
     frame = _compute_frame(editor)
-    _resize(editor, parse_length(text, now=frame.width), frame.height)
+    _resize(editor, parse_length(text, now=frame.width), frame.height or None)
 
 
 def _write_height(editor: Editor, text: str) -> None:
     frame = _compute_frame(editor)
-    _resize(editor, frame.width, parse_length(text, now=frame.height))
+    _resize(editor, frame.width or None, parse_length(text, now=frame.height))
 
 
-def _resize(editor: Editor, width: float, height: float) -> None:
-    """Resize the selection; a width or height of 0 m follows in proportion to the other."""
+def _resize(editor: Editor, width: float | None, height: float | None) -> None:
+    """Resize the selection; None for the width or height of a selection that has none."""
     selection = actions.select_owners(editor.selection)
-    editor.apply(transform.resize(editor.sketch, selection, width or None, height or None))
+    editor.apply(transform.resize(editor.sketch, selection, width, height))
 
 
 def _read_name(editor: Editor) -> str:
