@@ -11,7 +11,8 @@ from driven_window import run_command, run_text
 from pointer_events import build_event
 from sample_sessions import HALL, LLOYD, RAPF, RPF, build_presenter, describe_state
 
-from robocov.mapfile import list_bundled_maps, load_map
+from robocov.environment import Environment
+from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.setup.scenario import MAX_ROBOTS
@@ -154,6 +155,23 @@ def test_an_invalid_map_is_reported_and_the_present_one_stays(tmp_path: Path) ->
         assert viewer.files.map_name == "hall"
         assert viewer.session.displayed.environment is HALL
         viewer.has_error_message = False
+
+
+def test_the_next_map_skips_maps_that_cannot_be_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer = build_presenter()
+    unreadable = tmp_path / "unreadable.json"
+    unreadable.write_text("{")
+    small = tmp_path / "small.json"
+    corners = ((0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3))
+    save_map(Environment("Small", boundary=corners), small)
+    names = ["rooms", str(unreadable), str(small), "square"]
+    monkeypatch.setattr(viewer.files, "list_maps", lambda: names)
+    run_text(viewer, "map rooms")
+    run_command(viewer, "map:next")
+    assert viewer.files.map_name == "square"
+    assert viewer.message == f"No space for 3 robots: {small}; cannot be read: {unreadable}"
 
 
 def test_a_user_map_is_offered_after_the_bundled_maps() -> None:

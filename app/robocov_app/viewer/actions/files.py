@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from robocov.environment import Environment
-from robocov.errors import InputError
+from robocov.errors import InputError, MapError, format_count
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
@@ -138,17 +138,29 @@ class FileActions:
         names = self.list_maps()
         index = names.index(self.map_name) if self.map_name in names else 0
         too_small: list[str] = []
+        unreadable: list[str] = []
         for k in range(1, len(names) + 1):
             name = names[(index + steps * k) % len(names)]
             try:
                 self.open_map(name)
+            except MapError:
+                unreadable.append(name)
             except InputError:
                 too_small.append(name)
-                continue
-            if too_small:
-                robots = self._viewer.session.timeline.scenario.robots
-                self._viewer.show_message(f"no space for {robots} robots: {', '.join(too_small)}")
-            return
+            else:
+                break
+        self._report_skipped_maps(too_small, unreadable)
+
+    def _report_skipped_maps(self, too_small: list[str], unreadable: list[str]) -> None:
+        """Show a message with the names of the maps that could not be opened, if there are any."""
+        reasons: list[str] = []
+        if too_small:
+            robots = format_count(self._viewer.session.timeline.scenario.robots, "robot")
+            reasons.append(f"no space for {robots}: {', '.join(too_small)}")
+        if unreadable:
+            reasons.append(f"cannot be read: {', '.join(unreadable)}")
+        if reasons:
+            self._viewer.show_message("; ".join(reasons))
 
     def save_map(self) -> None:
         """Save the map to a new file."""
