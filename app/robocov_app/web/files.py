@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
@@ -129,13 +130,19 @@ def list_saved(
         Modification time of each uploaded file by its name. Uploads are omitted unless they were saved again.
     """
     try:
-        offered = [path for path in islice(folder.iterdir(), MAX_FOLDER_ENTRIES) if _is_offered(path)]
-        dated_names = [(path.stat().st_mtime, path.name) for path in offered]
+        paths = list(islice(folder.iterdir(), MAX_FOLDER_ENTRIES))
     except OSError:
         return ()
-    dated_names = [(time, name) for time, name in dated_names if uploads.get(name) != time]
-    recent = sorted((pair for pair in dated_names if pair[0] >= since), reverse=True)
-    return tuple(name for _, name in recent[:_MAX_OFFERED])
+    dated_names: list[tuple[float, str]] = []
+    for path in paths:
+        # Broken links, folders that cannot be read, and files that have just been removed are left out.
+        with suppress(OSError):
+            time = path.stat().st_mtime
+            is_recent = time >= since and uploads.get(path.name) != time
+            if is_recent and _is_offered(path):
+                dated_names.append((time, path.name))
+    dated_names.sort(reverse=True)
+    return tuple(name for _, name in dated_names[:_MAX_OFFERED])
 
 
 def _is_offered(path: Path) -> bool:

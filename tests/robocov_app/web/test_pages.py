@@ -166,6 +166,12 @@ def test_uploaded_files_are_not_offered_as_saved_until_they_are_saved(tmp_path):
     assert set(list_saved(tmp_path, 0.0, uploads)) == {"run.png", "broken.json"}
 
 
+def test_a_broken_link_does_not_hide_saved_files(tmp_path):
+    (tmp_path / "run.png").write_bytes(b"")
+    (tmp_path / "broken.json").symlink_to(tmp_path / "missing.json")
+    assert list_saved(tmp_path, 0.0) == ("run.png",)
+
+
 def test_the_page_says_who_asks_for_what_and_nothing_covers_its_messages():
     page = files("robocov_app.web").joinpath("page.html").read_text("utf-8")
     assert "${asking[0].name} asks for control" in page
