@@ -23,7 +23,10 @@ MAX_VIEWERS = 100
 MAX_CONTROL_PAGES = 16
 """Maximum number of pages opened with the control link. If one more is opened, the oldest is closed."""
 MAX_MAP_SIZES = 3
-"""Maximum number of sizes in which the map is drawn for pages; other pages scale one of these pictures."""
+"""Maximum number of sizes in which the map is drawn for pages, in addition to that of the controlling page.
+
+Other pages scale one of these pictures.
+"""
 MAX_MAP_PIXELS = 1_000_000
 """Maximum number of pixels of the map that is drawn for a page."""
 MAX_ASPECT_RATIO = 1.2

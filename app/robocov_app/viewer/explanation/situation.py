@@ -45,7 +45,7 @@ class NearbyObject:
     gap : float
         Distance from the robot's rim, m.
     obstruction : str
-        What obstructs the straight way from the robot to it; empty for nothing.
+        What obstructs the straight line from the robot to it; empty if nothing does.
     """
 
     name: str
@@ -120,7 +120,7 @@ class RobotSituation:
     holding_names : str
         Names of the objects against which it is pressed; empty for none.
     is_stuck : bool
-        Whether it is far from its goal, and something obstructs the straight way there.
+        Whether it is far from its goal, and something obstructs the straight line to it.
     """
 
     def __init__(

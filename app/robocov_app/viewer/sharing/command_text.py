@@ -30,8 +30,8 @@ def can_be_command(run: SharedRun) -> bool:
     """Return whether the options of a command can describe a run.
 
     There are no options for later edits, given starting positions, robots that differ from each other, their
-    mass, and a seed of the disturbances other than that of the starting positions. Robots that fail or join
-    are simulated in another way in the window.
+    mass, and a seed of the disturbances other than that of the starting positions. The window simulates
+    robots that fail or join differently from the command.
 
     Parameters
     ----------
