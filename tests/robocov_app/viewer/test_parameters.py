@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robocov.controllers import CONTROLLERS as CONTROLLER_CLASSES
 from robocov.controllers import IndividualControllerAdapter
 from robocov.controllers.gains import Gain, gain, get_gains
 from robocov.errors import ParameterError
@@ -186,6 +187,27 @@ def test_any_value_has_a_position(parameter, value):
     if value is not None and math.isfinite(value) and parameter.is_optional:
         # The right end of the slider is for no limit.
         assert parameter.compute_value(position) is not None
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLER_CLASSES))
+def test_sliders_of_whole_numbers_have_only_whole_numbers(name):
+    controller = ControllerChoice(name)
+    for parameter in list_gain_parameters(controller):
+        if isinstance(parameter, NumberParameter) and parameter.is_whole:
+            for k in range(11):
+                controller.with_gain(parameter.name, parameter.compute_value(k / 10))
+            if parameter.slider_step:
+                # An arrow key leads from each value to the next one.
+                first = replace(parameter, value=parameter.low)
+                position = first.compute_position() + parameter.slider_step
+                assert parameter.compute_value(position) == parameter.low + 1.0
+
+
+def test_large_whole_numbers_are_shown_in_full():
+    parameters = list_gain_parameters(ControllerChoice("poduri", {"neighbors": 100.0}))
+    neighbors = next(parameter for parameter in parameters if parameter.name == "neighbors")
+    assert neighbors.format() == "100"
+    assert replace(neighbors, value=48000.0).format() == "48000"
 
 
 def test_the_range_of_a_slider_is_around_the_default():

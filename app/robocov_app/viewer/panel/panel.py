@@ -313,7 +313,9 @@ class ViewerPanel(CommandPanel):
             ui.label(unit, key=f"unit:{name}", style="unit")
         slider_row = _FINGER_SLIDER_ROW_PX if self.viewer.view.is_compact else _SLIDER_ROW_PX
         ui.row(0, _RESET_PX, height=slider_row, gap=_PARAMETER_GAP_PX, below=5)
-        position = ui.slider(name, parameter.compute_position(), 0.0, 1.0, tip=_SLIDER_TIP)
+        step = parameter.slider_step
+        tip = "" if step else _SLIDER_TIP
+        position = ui.slider(name, parameter.compute_position(), 0.0, 1.0, step=step, tip=tip)
         if position is not None:
             self._set(name, parameter.compute_value(position))
         default = "unlimited" if parameter.default is None else f"{parameter.default:g} {unit}".rstrip()

@@ -13,6 +13,7 @@ from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 SLIDER_SPAN = 30.0  # a slider ranges from 1 / 30 of the default to 30 times the default
+MAX_STEPS = 100  # the slider of a whole number with at most this many steps is linear
 NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"
 NO_LIMIT_TEXTS = ("unlimited", "none", "null", "no limit", "inf", "∞", "")
 MAX_BASIC_GAINS = 4
@@ -143,6 +144,8 @@ class NumberParameter:
         Whether "no limit" is a possible value.
     is_advanced : bool
         Whether it is rarely used.
+    is_whole : bool
+        Whether only whole numbers are possible values.
     """
 
     name: str
@@ -156,6 +159,7 @@ class NumberParameter:
     high: float
     is_optional: bool
     is_advanced: bool
+    is_whole: bool = False
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -167,13 +171,25 @@ class NumberParameter:
         """Whether the current value is "no limit"."""
         return self.value is None or math.isinf(self.value)
 
+    @property
+    def slider_step(self) -> float:
+        """Distance of the possible positions of the slider; 0 if any position is possible."""
+        if self.is_whole and 0.0 < self.high - self.low <= MAX_STEPS:
+            return 1.0 / (self.high - self.low)
+        return 0.0
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the scale of the slider is linear; otherwise it is logarithmic."""
+        return self.low <= 0.0 or self.slider_step > 0.0
+
     def compute_position(self) -> float:
-        """Return the position of the slider, 0 to 1; the scale is logarithmic unless the range includes 0."""
+        """Return the position of the slider, 0 to 1."""
         if self.is_unlimited or self.value is None:
             return 1.0
         position = 0.0
         if self.high > self.low:
-            if self.low <= 0.0:
+            if self.is_linear:
                 position = (self.value - self.low) / (self.high - self.low)
             elif self.value > 0.0:
                 position = math.log(self.value / self.low) / math.log(self.high / self.low)
@@ -181,19 +197,27 @@ class NumberParameter:
         return min(max(position, 0.0), highest)
 
     def compute_value(self, position: float) -> float | None:
-        """Return the value at a position of the slider, rounded to three digits; None for no limit."""
+        """Return the value at a position of the slider; None for no limit.
+
+        The value is rounded to three digits, and to a whole number if only these are possible.
+        """
         if self.is_optional and position > NO_LIMIT_POSITION:
             return None
-        if self.low <= 0.0:
+        if self.is_linear:
             value = self.low + position * (self.high - self.low)
         else:
             value = self.low * (self.high / self.low) ** position
-        return min(max(float(f"{value:.3g}"), self.low), self.high)
+        value = float(f"{value:.3g}")
+        if self.is_whole:
+            value = float(round(value))
+        return min(max(value, self.low), self.high)
 
     def format(self) -> str:
         """Format the value, without its unit."""
         if self.is_unlimited:
             return "unlimited"
+        if self.is_whole:
+            return f"{self.value:.0f}"
         return f"{self.value:.4g}"
 
     def parse(self, text: str) -> float | None:
@@ -320,6 +344,11 @@ def _build_gain_parameter(
         lowest = reference_value / SLIDER_SPAN
     else:
         lowest = -SLIDER_SPAN * abs(reference_value)
+    low = max(gain.low, lowest)
+    high = min(gain.high, SLIDER_SPAN * abs(reference_value))
+    if gain.whole:
+        low = float(math.ceil(low))
+        high = float(math.floor(high))
     return NumberParameter(
         name=name,
         label=label,
@@ -328,10 +357,11 @@ def _build_gain_parameter(
         meaning=gain.meaning,
         value=None if isinstance(value, str) else value,
         default=gain.default,
-        low=max(gain.low, lowest),
-        high=min(gain.high, SLIDER_SPAN * abs(reference_value)),
+        low=low,
+        high=high,
         is_optional=gain.optional,
         is_advanced=is_advanced,
+        is_whole=gain.whole,
     )
 
 
