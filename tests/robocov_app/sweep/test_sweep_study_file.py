@@ -305,6 +305,7 @@ def test_a_pattern_selects_map_files_in_alphabetical_order(folder: Path) -> None
         ("maps/*.json", r"maps\[0\]: expected a pattern that matches at least one file, got 'maps/\*.json'"),
         ("/maps/*.json", r"maps\[0\]: expected a pattern relative to the study file, got '/maps/\*.json'"),
         ("maps/**.json", r'maps\[0\]: expected "\*\*" only in place of folders, .* got \'maps/\*\*.json\''),
+        (300 * "a" + "*.json", r"maps\[0\]: expected a pattern that matches at least one file, got 'aaa"),
     ],
 )
 def test_a_pattern_without_files_is_rejected(folder: Path, pattern: str, expected: str) -> None:

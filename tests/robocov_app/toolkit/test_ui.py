@@ -14,7 +14,14 @@ from robocov_app.look.theme import DARK, LIGHT, Theme
 from robocov_app.toolkit.commands.command import Argument, Command, CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.commands.palette import create_palette
-from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, create_file_choice
+from robocov_app.toolkit.dialogs import (
+    Answer,
+    Dialogs,
+    Option,
+    Question,
+    create_file_choice,
+    create_list_choice,
+)
 from robocov_app.toolkit.widgets.page import Widget
 from robocov_app.toolkit.widgets.text_edit import TextEdit
 from robocov_app.toolkit.widgets.ui import Ui
@@ -26,6 +33,7 @@ KEYS = {
     "left": pygame.K_LEFT,
     "up": pygame.K_UP,
     "down": pygame.K_DOWN,
+    "page down": pygame.K_PAGEDOWN,
     "backspace": pygame.K_BACKSPACE,
     "space": pygame.K_SPACE,
 }
@@ -515,6 +523,36 @@ class TestFileChoice:
         assert not any(str(tmp_path.parent) in text for text in [choice.placeholder, *texts])
 
 
+class TestListChoice:
+    @pytest.fixture
+    def options(self) -> list[Option]:
+        return [Option(f"Line {number}", description="described") for number in range(30)]
+
+    @pytest.fixture
+    def dialogs(self, options: list[Option]) -> Dialogs:
+        dialogs = Dialogs()
+        dialogs.ask(create_list_choice("Lines", lambda: options, print))
+        return dialogs
+
+    def test_the_highlighted_line_stays_visible_in_a_smaller_window(self, dialogs: Dialogs) -> None:
+        send_events(dialogs, pygame.Surface((320, 900)), *[build_key_event("down")] * 8)
+        assert self.list_visible(dialogs, pygame.Surface((320, 300)))[-1] == "Line 8"
+
+    def test_the_remaining_lines_are_visible_if_others_disappear(
+        self, dialogs: Dialogs, options: list[Option], screen: pygame.Surface
+    ) -> None:
+        send_events(dialogs, screen, *[build_key_event("page down")] * 4)
+        del options[2:]
+        assert self.list_visible(dialogs, screen) == ["Line 0", "Line 1"]
+
+    @staticmethod
+    def list_visible(dialogs: Dialogs, screen: pygame.Surface) -> list[str]:
+        """Draw the dialog, and return its visible lines."""
+        dialogs.draw(screen, LIGHT, 1.0)
+        assert dialogs.ui is not None
+        return [widget.text for widget in dialogs.ui.widgets.values() if widget.kind == "option"]
+
+
 class TestMenu:
     @pytest.fixture
     def recorded(self) -> RecordedCommands:
@@ -538,6 +576,18 @@ class TestMenu:
         dialogs.handle_event(build_key_event("return"))
         assert recorded.effects == ["pause"]
         assert not dialogs.is_open
+
+    def test_a_long_menu_scrolls_to_the_highlighted_command(self, screen: pygame.Surface) -> None:
+        rows = [Command(f"command:{number}", f"Command {number}", "Many", print) for number in range(20)]
+        dialogs = Dialogs()
+        dialogs.ask(Menu(rows, (0, 0), print))
+        send_events(dialogs, screen, *[build_key_event("down")] * 18)
+        dialogs.draw(screen, LIGHT, 1.0)
+        assert dialogs.ui is not None
+        highlighted = dialogs.ui.find("option", "command:17")
+        assert highlighted is not None
+        assert highlighted.value
+        assert highlighted.rect.height > 20
 
 
 def test_a_command_typed_within_one_frame_runs(tmp_path: Path) -> None:

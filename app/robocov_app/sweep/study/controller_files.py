@@ -8,7 +8,7 @@ from typing import Any
 
 from robocov.controllers import load_controller_class
 from robocov.controllers.user_modules import ControllerSource, find_own_modules
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, describe_error, quote, to_one_line
 
 
 def load_study_controller(name: str, folder: Path) -> tuple[type[Any], ControllerSource | None]:
@@ -80,12 +80,15 @@ def _read_source(name: str, folder: Path) -> ControllerSource | None:
     file_name, _, class_name = name.rpartition(":")
     if not class_name or not file_name.endswith(".py"):
         return None
-    path = (folder / file_name).resolve()
+    path = folder / file_name
     try:
+        path = path.resolve()
         return ControllerSource(str(path), path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
-        raise ParameterError(f"{quote(name)}: {path}: {reason}") from None
+    except UnicodeDecodeError:
+        raise ParameterError(f"{quote(name)}: {path}: not UTF-8") from None
+    except (OSError, RuntimeError, ValueError) as error:
+        # Before Python 3.13, circular links raise RuntimeError.
+        raise ParameterError(f"{quote(name)}: {to_one_line(path)}: {describe_error(error)}") from None
 
 
 def source_to_json(source: ControllerSource | None) -> dict[str, Any]:

@@ -6,6 +6,7 @@ single value, a list of values or a table, and the message must describe the alt
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -460,7 +461,8 @@ def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> li
     if not entry.endswith(".json"):
         raise InputError(describe_unknown_name("map", entry, bundled))
     path = folder / entry
-    is_pattern = "*" in entry and not path.is_file()
+    # Unlike Path.is_file, this does not raise if the name is too long for a file.
+    is_pattern = "*" in entry and not os.path.isfile(path)  # noqa: PTH113
     if not is_pattern:
         return [(path.stem, path)]
     if Path(entry).is_absolute():

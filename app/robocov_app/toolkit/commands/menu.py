@@ -108,6 +108,7 @@ class Menu(Dialog):
         numbers = [number for number, row in enumerate(self.rows) if _is_enabled(row)]
         if name in _KEY_STEPS and numbers:
             self._move(_KEY_STEPS[name], numbers)
+            self._reveal_highlighted(ui)
         elif name in ENTER_KEYS and self.highlighted in numbers:
             self._choose(self.rows[self.highlighted])
         return True
@@ -129,6 +130,12 @@ class Menu(Dialog):
         else:
             index = -1
         self.highlighted = numbers[index % len(numbers)]
+
+    def _reveal_highlighted(self, ui: Ui) -> None:
+        """Scroll the highlighted row into view: the scroll area reveals the widget with the focus."""
+        command = self.rows[self.highlighted]
+        if command is not None:
+            ui.set_focus(command.name)
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
         """Move the box to its position, and make it as wide as the longest row and as high as all rows."""

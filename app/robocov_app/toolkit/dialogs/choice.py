@@ -142,6 +142,8 @@ class Choice(Dialog):
     def _show_options(self, ui: Ui, options: Sequence[Option]) -> None:
         """Show the visible lines of the list, and accept the one that is clicked."""
         self._has_descriptions = any(option.description for option in options)
+        # There may be fewer options, or less space for them, than when one was last highlighted.
+        self._reveal_highlighted(len(options))
         ui.row(height=self._option_height, below=_OPTION_GAP_PX)
         if not options:
             ui.label(self.empty_text, style="unit")
@@ -240,9 +242,14 @@ class Choice(Dialog):
 
     def _move(self, step: int) -> None:
         """Highlight the line `step` lines below, and scroll it into view."""
-        last = max(len(self.options(self.text)) - 1, 0)
-        self.highlighted = min(max(self.highlighted + step, 0), last)
-        self.top = min(max(self.top, self.highlighted - self._visible_count + 1), self.highlighted)
+        count = len(self.options(self.text))
+        self.highlighted = min(max(self.highlighted + step, 0), max(count - 1, 0))
+        self._reveal_highlighted(count)
+
+    def _reveal_highlighted(self, count: int) -> None:
+        """Scroll the highlighted one of some lines into view, with no empty space below the last line."""
+        top = min(self.top, max(count - self._visible_count, 0))
+        self.top = min(max(top, self.highlighted - self._visible_count + 1), self.highlighted)
 
 
 def create_list_choice(
