@@ -25,10 +25,12 @@ def test_a_syntax_error_is_reported_with_its_line(text: str, place: str, reason:
 
 def test_a_link_to_itself_is_reported(tmp_path: Path) -> None:
     (tmp_path / "mine.py").symlink_to("mine.py")
-    with pytest.raises(ParameterError, match=r"^'mine\.py:Mine': .*mine\.py: .*(Symlink loop|symbolic links)"):
+    with pytest.raises(
+        ParameterError, match=r"^'mine\.py:Mine': .*mine\.py: .*(Symlink loop|symbolic links)"
+    ):
         read_controller_source("mine.py:Mine", tmp_path)
 
 
 def test_a_path_that_no_file_can_have_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="embedded null byte$"):
+    with pytest.raises(ParameterError, match=r"embedded null byte$"):
         read_controller_source("mi\0ne.py:Mine", tmp_path)
