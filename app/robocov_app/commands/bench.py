@@ -255,8 +255,9 @@ def format_duration(seconds: float | None) -> str:
     """
     if seconds is None:
         return ""
-    if seconds < 1e-3:
+    # The limits apply to the rounded values, so that the text is neither "1000 µs" nor "1000.0 ms".
+    if round(seconds * 1e6) < 1000:
         return f"{seconds * 1e6:.0f} µs"
-    if seconds < 1.0:
+    if round(seconds * 1e3, 1) < 1000.0:
         return f"{seconds * 1e3:.1f} ms"
     return f"{seconds:.2f} s"

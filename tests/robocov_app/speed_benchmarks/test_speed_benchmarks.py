@@ -322,7 +322,15 @@ def test_no_text_of_the_plot_is_cut_off_or_overlaps(
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(0.00031, "310 µs"), (0.012, "12.0 ms"), (2.5, "2.50 s"), (None, "")]
+    ("seconds", "text"),
+    [
+        (0.00031, "310 µs"),
+        (0.0009999, "1.0 ms"),
+        (0.012, "12.0 ms"),
+        (0.99999, "1.00 s"),
+        (2.5, "2.50 s"),
+        (None, ""),
+    ],
 )
 def test_durations_have_a_suitable_unit(seconds: float | None, text: str) -> None:
     assert bench.format_duration(seconds) == text
