@@ -239,6 +239,8 @@ def _verify(options: Arguments) -> int:
             path, controller=options.controller, options=extent, stop=interruption, quiet=options.json
         )
         if interruption.requested:
+            message = "Interrupted. The result was not verified."
+            print_answer(options, {"path": str(path), "interrupted": True}, message)
             return INTERRUPTED
     differences = verification.differences
     comparison = verification.comparison

@@ -39,10 +39,11 @@ from robocov_app.benchmark.verification.verification import (
     VerificationOptions,
     verify_result,
 )
+from robocov_app.cli import main
 from robocov_app.sweep import worker
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import perform
-from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 
 MAP = "blocks-a"
 TRACKS = ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
@@ -775,3 +776,21 @@ def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
         assert new_map.name not in suite.FAMILY_OF
         assert suite.compute_map_hash(new_map.environment) not in hashes
         assert len(new_map.environment.start().sample(6, seed=new_map.start_seed)) == 6
+
+
+@pytest.mark.parametrize(
+    ("options", "answer"),
+    [
+        ([], "Interrupted. The result was not verified.\n"),
+        (["--json"], '{"path": "mine", "interrupted": true}\n'),
+    ],
+)
+def test_an_interrupted_verification_is_reported(
+    options: list[str], answer: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(path: Path, *, stop: Interruption, **_: object) -> None:
+        stop.requested = True
+
+    monkeypatch.setattr(verification, "verify_result", interrupt)
+    assert main(["benchmark", "verify", "mine", *options]) == INTERRUPTED
+    assert capsys.readouterr().out == answer
