@@ -199,14 +199,14 @@ def _draw_cells(record: Record, frame: PictureFrame) -> str:
 
 
 def _draw_trajectories(record: Record, frame: PictureFrame) -> str:
-    """Draw the trajectories as one path; each starts where its robot joined."""
+    """Draw the trajectories of the robots that joined as one path; each starts where its robot joined."""
     if not has_path(record) or len(record.team) > MAX_ROBOTS:
         return ""
     first_rows = np.argmax(record.is_present, axis=0)
     tracks = np.moveaxis(frame.to_pixels(record.positions), 1, 0)
     lines = []
-    for track, first_row in zip(tracks, first_rows, strict=True):
-        track_since_join = track[first_row:]
+    for robot in np.flatnonzero(record.is_present.any(axis=0)).tolist():
+        track_since_join = tracks[robot, first_rows[robot] :]
         if len(track_since_join) > 1:
             simplified = shapely.simplify(shapely.LineString(track_since_join), _TOLERANCE_PX)
             lines.append(shapely.get_coordinates(simplified))

@@ -46,6 +46,8 @@ def test_failed_robots_are_crossed_out_and_absent_robots_are_not_drawn() -> None
     assert len(find_class(root, "robot")) == 3
     assert [each.tag.rpartition("}")[2] for each in find_class(root, "failed")] == ["circle", "path"]
     assert len(find_class(root, "start")) == 4
+    (trajectories,) = find_class(root, "trajectory")
+    assert trajectories.attrib["d"].count("M") == 4
     assert "Robot 2 fails at 2.0 s, robot 4 joins at 3.0 s." in svg
     assert "fails" not in draw_run(record, None)
 

@@ -86,7 +86,7 @@ def _load_runs(folder: Path) -> ReportedResult:
         started_folders = [run_folder for run_folder in run_folders if (run_folder / RUN_FILE).is_file()]
     saved_runs, damaged_runs = _read_runs(started_folders)
     if not saved_runs and not damaged_runs:
-        raise InputError(f"{path}: there is no run in it")
+        raise InputError(f"{path}: expected at least one run, got none")
     runs = []
     maps: dict[str, Environment] = {}
     facts: dict[str, Any] = {}

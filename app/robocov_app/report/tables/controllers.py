@@ -61,11 +61,13 @@ def _format_range(values: Sequence[Value], unit: str) -> str:
     numbers = [value for value in values if isinstance(value, int | float)]
     if not numbers:
         return "none"
-    low = min(numbers)
-    high = max(numbers)
-    text = f"{low:.4g} to {high:.4g}"
+    low = f"{min(numbers):.4g}"
+    high = f"{max(numbers):.4g}"
     if low == high:
-        text = f"{low:.6g}"
+        # Sampled gains have six significant digits.
+        low = f"{min(numbers):.6g}"
+        high = f"{max(numbers):.6g}"
+    text = low if low == high else f"{low} to {high}"
     text += f" {unit}".rstrip()
     if len(numbers) < len(values):
         text += " or none"
