@@ -187,7 +187,7 @@ def build_map_handles(
     if show_boundary:
         color = to_plot_color(theme.boundary)
         handles.append(Line2D([], [], color=color, linewidth=LINE_WIDTH_PT, label=legend.KNOWN_REGION))
-    if not environment.blocked.is_empty:
+    if not environment.static.blocked.is_empty:
         handles.append(Patch(label=legend.UNKNOWN_OBSTACLE, **_build_obstacle_style(theme)))
     if environment.has_moving_obstacles:
         square = Line2D(

@@ -704,6 +704,11 @@ class TestMovingObstacles:
         assert label not in list_legend_texts(plot_environment(self.STATIC))
         assert label in list_legend_texts(plot_environment(self.MOVING))
 
+    def test_the_legend_lists_obstacles_at_rest_only_if_there_are_any(self):
+        label = "obstacle (unknown to robots)"
+        assert label in list_legend_texts(plot_environment(self.MOVING))
+        assert label not in list_legend_texts(plot_environment(replace(self.MOVING, obstacles=(self.CART,))))
+
     def test_a_moving_obstacle_has_a_path_and_an_arrow(self):
         axes = plot_environment(self.MOVING).axes[0]
         assert any(np.allclose(line.get_xydata()[0], (1, 1)) for line in axes.lines)
