@@ -379,7 +379,7 @@ def _draw_line(axes: Axes, item: StyledCurve, color: PlotColor, weight: float) -
 
 
 def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd], weight: float) -> None:
-    """Write mark and label of each curve right of the axes, with a line from the height of its last value."""
+    """Draw mark and label of each curve to the right of the axes, with a line at the height of its end."""
     dpi = get_figure(axes).dpi
     box = axes.get_window_extent()
     # One point as a fraction of the width of the axes.

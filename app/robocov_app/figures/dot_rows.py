@@ -162,7 +162,7 @@ def draw_row_marks(axes: Axes, rows: Sequence[float], styles: Sequence[CurveStyl
 
 
 def draw_row_points(axes: Axes, values: FloatArray, row: float, style: CurveStyle, theme: Theme) -> None:
-    """Draw sorted values as points in a row, scattered vertically so that few points hide others."""
+    """Draw sorted values as points in a row, scattered vertically so that they rarely hide each other."""
     if len(values) > MAX_POINTS:
         ranks = np.rint(np.linspace(0, len(values) - 1, MAX_POINTS)).astype(int)
         values = values[ranks]

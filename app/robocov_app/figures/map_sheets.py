@@ -40,6 +40,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     Parameters
     ----------
     environments : sequence of Environment
+        At least one.
     theme : Theme or str
 
     Returns

@@ -83,7 +83,7 @@ def check_not_empty(name: str, items: Sequence[object]) -> None:
 
 
 def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:
-    """Give axes the colors of a theme, and labels; of the frame, only the bottom line of a grid is visible.
+    """Set the colors, labels and grid of axes; with a grid, the bottom line of the frame is visible as well.
 
     Parameters
     ----------

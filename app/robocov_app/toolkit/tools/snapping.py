@@ -290,13 +290,11 @@ class _SnapSearch:
             self.list_line_snaps(),
             self.list_grid_snaps(),
         )
-        rank = 0
-        for group in groups:
+        for rank, group in enumerate(groups):
             near = [snap for snap in group if self._is_near(snap.point)]
             if near:
                 return _RankedSnap(rank, min(near, key=self._sort_key))
-            rank += 1
-        return _RankedSnap(rank, Snap(self.point))
+        return _RankedSnap(len(groups), Snap(self.point))
 
     def _is_near(self, point: Point) -> bool:
         return math.dist(self.point, point) <= self.settings.reach
