@@ -107,9 +107,12 @@ class Results:
         """
         path = self.folder / STUDY_FILE
         try:
-            return dict(json.loads(path.read_bytes()))
+            content = json.loads(path.read_bytes())
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from error
+        if not isinstance(content, dict):
+            raise InputError(f"{path}: expected a JSON object, got {quote(content)}")
+        return content
 
     def rows(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
         """Read the rows of the table one after another.
@@ -129,7 +132,7 @@ class Results:
         InputError
             If there is no such column; the message suggests the most similar name.
         """
-        for name in columns or ():
+        for name in () if columns is None else columns:
             if name not in self.columns:
                 raise InputError(f"{self.folder}: {describe_unknown_name('column', name, self.columns)}")
         return read_rows(self._table, self._read_kinds(), columns)
@@ -155,7 +158,7 @@ class Results:
             If there is no such column; the message suggests the most similar name.
         """
         pandas = import_optional("pandas", "pandas")
-        names = list(columns or self.columns)
+        names = list(self.columns if columns is None else columns)
         frame: DataFrame = pandas.DataFrame(list(self.rows(names)), columns=names)
         kinds = self._read_kinds()
         # Columns without any value would otherwise have the type object.
@@ -342,14 +345,17 @@ def read_rows(
     names = next(lines, None)
     if names is None:
         raise InputError(f"{table}: cannot be read: the file is empty")
-    selected = list(columns or names)
+    selected = list(names if columns is None else columns)
     column_indices = [names.index(name) for name in selected]
     for row_index, cells in enumerate(lines):
+        if len(cells) != len(names):
+            expected = format_count(len(names), "cell")
+            raise InputError(f"{table}: row {row_index}: expected {expected}, got {len(cells)}")
         row = {}
         try:
             for name, column_index in zip(selected, column_indices, strict=True):
                 row[name] = _parse_value(cells[column_index], kinds.get(name))
-        except (ValueError, IndexError) as error:
+        except ValueError as error:
             raise InputError(f"{table}: row {row_index}: cannot be read: {error}") from error
         yield row
 
@@ -392,6 +398,8 @@ def read_history(path: Path) -> CostHistory:
     required_names = list(_HISTORY_COLUMNS)
     if names not in (required_names, [*required_names, _MEAN_TIME_COLUMN]):
         raise InputError(f"{path}: line 1: expected the header {','.join(_HISTORY_COLUMNS)}")
+    if len(lines) == 1:
+        raise InputError(f"{path}: line 2: expected {len(names)} numbers, got the end of the file")
     rows = np.empty((len(lines) - 1, len(names)))
     for row, line in enumerate(lines[1:]):
         cells = line.split(",")
@@ -432,7 +440,7 @@ def _read_error(path: Path) -> str:
     """Read the message of a run that failed."""
     try:
         return str(json.loads(path.read_bytes())["error"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "the reason cannot be read"
 
 

@@ -104,6 +104,15 @@ def test_rows_are_a_data_frame(folder: Path) -> None:
     assert few.dropna().to_dict("list") == {"controller": ["rapf"], "mean_distance_m": [1.5]}
 
 
+def test_no_columns_are_read_if_none_are_selected(folder: Path) -> None:
+    assert list(read_results(folder).rows([])) == [{}, {}]
+
+
+def test_columns_can_be_selected_by_an_array(folder: Path) -> None:
+    rows = read_results(folder).rows(np.array(["seed", "map"]))
+    assert [row["seed"] for row in rows] == [row["seed"] for row in ROWS]
+
+
 def test_failures_returns_the_rows_of_failed_runs(folder: Path) -> None:
     assert read_results(folder).failures() == ROWS[1:]
 
@@ -156,6 +165,14 @@ def test_errors_name_the_row_of_an_invalid_number(folder: Path) -> None:
         write_table(folder, [ROWS[0], ROWS[0] | change])
         with pytest.raises(InputError, match=r"results.csv: row 1: cannot be read: "):
             list(read_results(folder).rows())
+
+
+@pytest.mark.parametrize("line", ["NA", "", ",".join(["1"] * (len(ROWS[0]) + 1))])
+def test_errors_name_a_row_with_too_few_or_too_many_cells(folder: Path, line: str) -> None:
+    with (folder / "results.csv").open("a") as file:
+        file.write(line + "\n")
+    with pytest.raises(InputError, match=rf"results.csv: row 2: expected {len(ROWS[0])} cells, got "):
+        list(read_results(folder).rows(["map"]))
 
 
 def test_a_gain_declared_as_a_string_stays_a_string(folder: Path) -> None:
@@ -219,6 +236,10 @@ def test_errors_name_an_unreadable_study(folder: Path) -> None:
     (folder / "study.json").write_text("{")
     with pytest.raises(InputError, match=r"study.json: cannot be read"):
         _ = read_results(folder).study
+    for content in ("5", "null", "[1]", '"text"'):
+        (folder / "study.json").write_text(content)
+        with pytest.raises(InputError, match=r"study.json: expected a JSON object, got "):
+            _ = read_results(folder).study
 
 
 def test_errors_name_the_extra_that_installs_pandas(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -238,6 +259,10 @@ def test_errors_name_the_extra_that_installs_pandas(folder: Path, monkeypatch: p
         (
             "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n1,2,3,4\n1,2\n",
             "line 3: expected 4 numbers",
+        ),
+        (
+            "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n",
+            "line 2: expected 4 numbers, got the end of the file",
         ),
         (
             "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n1,2,three,4\n",
