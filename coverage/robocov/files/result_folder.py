@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path, PurePosixPath
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, describe_error, quote
 from robocov.files.folder_lock import lock_folder
@@ -400,15 +400,26 @@ def _read_manifest(path: Path) -> tuple[set[str], set[str]] | None:
         if path.is_symlink() or not path.is_file():
             raise ValueError("not a regular file")
         content = json.loads(path.read_bytes())
-        if {key: content[key] for key in _HEADER} != _HEADER:
-            raise ValueError(f"{quote(content['format'])}, version {quote(content['version'])}")
-        files = set(content["files"])
-        removed_files = set(content.get("removed", ()))
-        for name in files | removed_files:
-            _require_result_file(name)
+        if not isinstance(content, dict):
+            raise ValueError(f"expected a JSON object, got {quote(content)}")
+        for key, expected in _HEADER.items():
+            if content.get(key) != expected:
+                raise ValueError(f"{key}: expected {quote(expected)}, got {quote(content.get(key))}")
+        files = _require_file_names("files", content.get("files"))
+        # A manifest lists no files to remove.
+        removed_files = _require_file_names("removed", content.get("removed", []))
         return files, removed_files
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
+
+
+def _require_file_names(key: str, names: Any) -> set[str]:
+    """Return a list of files in a manifest or journal as a set; raise ValueError if it cannot be used."""
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"{key}: expected a list of files, got {quote(names)}")
+    for name in names:
+        _require_result_file(name)
+    return set(names)
 
 
 def _require_result_file(name: str) -> None:
@@ -564,8 +575,8 @@ def _list_run_folders(folder: Path) -> list[Path]:
         names = [str(name) for name in json.loads((folder / COMPARISON_FILE).read_bytes())["folders"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
-    # Other names could lead out of the folder.
-    plain_names = [name for name in names if name != ".." and Path(name).name == name]
+    # Other names could lead out of the folder, or to the folder itself.
+    plain_names = [name for name in names if name not in ("", "..") and Path(name).name == name]
     run_folders = [folder / name for name in plain_names]
     return [path for path in run_folders if path.is_dir() and not path.is_symlink()]
 

@@ -228,6 +228,27 @@ def test_lists_of_files_cannot_lead_out_of_the_folder(tmp_path: Path, list_file:
     assert list_names(tmp_path) == ["mine.txt", "out"]
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ([], "expected a JSON object, got []"),
+        ({}, "format: expected 'robocov-folder', got None"),
+        ({"format": "robocov-folder", "version": 2}, "version: expected 1, got 2"),
+        ({"format": "robocov-folder", "version": 1}, "files: expected a list of files, got None"),
+        (
+            {"format": "robocov-folder", "version": 1, "files": [1]},
+            "files: expected a list of files, got [1]",
+        ),
+    ],
+)
+def test_errors_name_what_is_wrong_with_a_journal(tmp_path: Path, content: object, message: str) -> None:
+    save_result(tmp_path, OLD)
+    (tmp_path / ".robocov-commit.json").write_text(json.dumps(content))
+    with pytest.raises(InputError) as caught:
+        complete_commit(tmp_path)
+    assert str(caught.value) == f"{tmp_path / '.robocov-commit.json'}: cannot be used: {message}"
+
+
 @pytest.mark.parametrize("list_file", [".robocov.json", ".robocov-commit.json"])
 def test_forged_lists_of_files_remove_nothing_else(tmp_path: Path, list_file: str) -> None:
     save_result(tmp_path, OLD)
@@ -348,7 +369,10 @@ def test_a_comparison_without_a_manifest_is_replaced_with_its_runs_only(
         write_files(run, OLD)
     (folder / "linked").symlink_to(elsewhere)
     write_files(tmp_path, {"run.json": "mine"})
-    comparison = {"format": "robocov-comparison", "folders": ["rapf", "linked", "../elsewhere", "..", "."]}
+    comparison = {
+        "format": "robocov-comparison",
+        "folders": ["rapf", "linked", "../elsewhere", "..", ".", ""],
+    }
     write_files(
         folder,
         {"comparison.json": json.dumps(comparison), "comparison.csv": "", "mine.txt": "", ".x.part.zip": ""},
