@@ -207,10 +207,12 @@ def compare(
         raise ParameterError(f"controllers: expected a list of controllers, got {quote(controllers)}")
     scenario = Scenario(environment, controllers[0], **options)
     cost = CoverageCost(scenario.environment, lattice=lattice, radius=scenario.team.min_radius)
+    # A scenario drops these when its controller is replaced, unless they are given again.
+    controller_options = {name: options[name] for name in ("gains", "source") if name in options}
     records: dict[str, Record] = {}
     histories: dict[str, CostHistory] = {}
     for controller in controllers:
-        record = scenario.replace(controller=controller).run()
+        record = scenario.replace(controller=controller, **controller_options).run()
         label = _make_unique(record.label, records)
         records[label] = record
         histories[label] = compute_cost_history(record, cost)

@@ -39,6 +39,13 @@ def test_equal_labels_are_numbered() -> None:
     assert comparison.records["RAPF (2)"].gains["k_rep"] == 0.3
 
 
+def test_gains_apply_to_all_controllers() -> None:
+    comparison = rc.compare(ROOM, ["rpf", "rapf"], robots=2, duration=0.1, lattice=8, gains={"k_rep": 0.4})
+    assert [record.gains["k_rep"] for record in comparison.records.values()] == [0.4, 0.4]
+    with pytest.raises(ParameterError, match="k_rep"):
+        rc.compare(ROOM, ["rapf", "lloyd"], robots=2, duration=0.1, lattice=8, gains={"k_rep": 0.4})
+
+
 def test_a_comparison_prints_as_an_aligned_table() -> None:
     comparison = rc.compare(ROOM, ["rapf", "lloyd"], robots=2, duration=0.5, lattice=8)
     lines = repr(comparison).splitlines()
