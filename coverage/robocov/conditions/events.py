@@ -46,7 +46,8 @@ class Failure(NamedTuple):
     time: float
 
     def __str__(self) -> str:
-        return f"{self.robot}@{self.time:g}"
+        """Return the text from which `parse_event` builds an equal event."""
+        return f"{self.robot}@{_format_exactly(self.time)}"
 
 
 class Join(NamedTuple):
@@ -80,10 +81,12 @@ class Join(NamedTuple):
     position: tuple[float, float] | None = None
 
     def __str__(self) -> str:
+        """Return the text from which `parse_event` builds an equal event."""
+        text = f"{self.robot}@{_format_exactly(self.time)}"
         if self.position is None:
-            return f"{self.robot}@{self.time:g}"
+            return text
         x, y = self.position
-        return f"{self.robot}@{self.time:g}:{x:g},{y:g}"
+        return f"{text}:{_format_exactly(x)},{_format_exactly(y)}"
 
 
 class JoinedRobot(NamedTuple):
@@ -112,6 +115,12 @@ class JoinedRobot(NamedTuple):
     def offset(self) -> float:
         """Distance from the requested position, m; above 0 if a wall or another robot was too close to it."""
         return math.dist(self.position, self.requested_position)
+
+
+def _format_exactly(value: float) -> str:
+    """Format a number with as many digits as are needed to read the same number again."""
+    short_text = f"{value:g}"
+    return short_text if float(short_text) == value else repr(float(value))
 
 
 Event = TypeVar("Event", bound=Failure | Join)

@@ -228,7 +228,21 @@ def test_any_text_is_a_join_or_gives_a_message_of_one_line(text: str) -> None:
     except ParameterError as error:
         assert "\n" not in str(error)
     else:
-        assert parse_event(Join, text) == join
+        assert parse_event(Join, text) == parse_event(Join, str(join)) == join
+
+
+@pytest.mark.parametrize(
+    ("event", "text"),
+    [
+        (Failure(3, 20.0), "3@20"),
+        (Failure(3, 1234.5678), "3@1234.5678"),
+        (Join(5, 30.0, (2.5, 1e-7)), "5@30:2.5,1e-07"),
+        (Join(5, 1e6, (385123.25, -0.1)), "5@1e+06:385123.25,-0.1"),
+    ],
+)
+def test_the_text_of_an_event_contains_its_exact_numbers(event: Failure | Join, text: str) -> None:
+    assert str(event) == text
+    assert parse_event(type(event), text) == event
 
 
 def test_reprs_contain_what_differs_from_the_defaults() -> None:
