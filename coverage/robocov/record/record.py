@@ -401,8 +401,12 @@ class Record(Drawable):
         ------
         OutputError
             If the folder or a file cannot be written.
+        ValueError
+            If the summary contains a number that JSON does not have. Nothing is written then.
         """
         folder = Path(folder)
+        # A summary that JSON cannot contain raises an error here, before any file is replaced.
+        text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
         complete_commit(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -412,7 +416,6 @@ class Record(Drawable):
         with replace_file(folder / RECORD_FILE) as temporary, temporary.open("wb") as file:
             # Compression would make the file 10% smaller and take 20 times as long.
             np.savez(file, **arrays)
-        text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
         with replace_file(folder / RUN_FILE) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
@@ -437,7 +440,7 @@ class Record(Drawable):
             If this is not the folder of a run, or if a file in it cannot be used.
         """
         folder = Path(folder)
-        # If `save` was interrupted while it replaced files, the replacement is completed first.
+        # If the replacement of the result in the folder was interrupted, it is completed first.
         complete_commit(folder)
         for file in (RUN_FILE, RECORD_FILE):
             require_result(folder, "the folder of a run", (file,))

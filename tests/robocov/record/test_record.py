@@ -49,6 +49,17 @@ def test_a_saved_record_can_be_loaded(record: Record, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["record.npz", "run.json"]
 
 
+def test_a_summary_that_json_cannot_contain_leaves_the_saved_run_unchanged(
+    record: Record, tmp_path: Path
+) -> None:
+    record.save(tmp_path / "run")
+    for folder in (tmp_path / "run", tmp_path / "new"):
+        with pytest.raises(ValueError, match="JSON compliant"):
+            record.until(1.0).save(folder, {"mean_distance_m": float("nan")})
+    assert len(Record.load(tmp_path / "run")) == len(record)
+    assert not (tmp_path / "new").exists()
+
+
 def test_gains_with_a_former_spelling_are_loaded_with_the_present_one(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())
