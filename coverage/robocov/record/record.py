@@ -316,7 +316,9 @@ class Record(Drawable):
     def _select_steps(self, steps: slice | IntArray) -> Record:
         """Return a record of the selected time steps, with copies of the arrays."""
         arrays = {name: getattr(self, name)[steps].copy() for name in self.arrays}
-        return replace(self, **arrays)
+        end_time = arrays["time"][-1] + TIME_ROUNDING_S
+        joined = tuple(robot for robot in self.joined if robot.time <= end_time)
+        return replace(self, joined=joined, **arrays)
 
     def to_pandas(self) -> Any:
         """Return the run as a tidy data frame, one row for each time step and robot, by time, then robot.

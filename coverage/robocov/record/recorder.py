@@ -112,7 +112,7 @@ class Recorder:
         Parameters
         ----------
         joined : tuple of JoinedRobot
-            The robots that joined during these steps.
+            Robots that have joined. The record leaves out those that are present at its first step.
 
         Returns
         -------
@@ -139,7 +139,7 @@ class Recorder:
             obstacle_points=arrays["obstacle_points"],
             conditions=self.conditions,
             steering=arrays.get(STEERING),
-            joined=joined,
+            joined=tuple(robot for robot in joined if robot.time > self._times[0]),
             sent_bytes=sent_bytes,
         )
 

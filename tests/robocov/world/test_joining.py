@@ -101,6 +101,17 @@ def test_copies_know_which_robots_have_joined() -> None:
     assert twin.with_changes(controller=Rapf()).joined == twin.joined
 
 
+def test_a_record_contains_only_robots_that_joined_during_its_steps() -> None:
+    conditions = Conditions(joins=[(3, 0.5), (2, 1.0)])
+    simulation = Simulation(ROOM, Lloyd(), STARTS, dt=0.05, conditions=conditions)
+    first_record = simulation.run(0.75)
+    second_record = simulation.run(0.75)
+    assert [joined.robot for joined in first_record.joined] == [3]
+    assert [joined.robot for joined in second_record.joined] == [2]
+    assert first_record.until(0.25).joined == ()
+    assert first_record.until(0.5).joined == first_record.thin(1.0).joined == first_record.joined
+
+
 def test_robots_that_are_placed_by_the_user_do_not_travel() -> None:
     record = run_with_joins(duration=2.0)
     positions = record.positions.copy()
