@@ -457,6 +457,10 @@ class Record(Drawable):
                 conditions.check_team(len(team))
         except ParameterError as error:
             raise InputError(f"{path}: {error}") from error
+        numbers = document.session.robots
+        if numbers and (len(numbers) != len(team) or len(set(numbers)) != len(team)):
+            expected = f"expected {len(team)} different numbers, one for each robot"
+            raise InputError(f"{path}: session.robots: {expected}, got {quote(numbers)}")
         arrays: dict[str, Any] = dict(read_record_arrays(folder / RECORD_FILE, team))
         return cls(
             environment=environment,

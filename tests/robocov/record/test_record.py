@@ -294,6 +294,14 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
             edit_document("session", "robots", to="1234"),
             'run.json: session.robots: expected a list, got "1234"',
         ),
+        (
+            edit_document("session", to={"robots": [1, 2, 3, 4, 5]}),
+            "run.json: session.robots: expected 4 different numbers, one for each robot, got [1, 2, 3, 4, 5]",
+        ),
+        (
+            edit_document("session", to={"robots": [1, 1, 2, 3]}),
+            "run.json: session.robots: expected 4 different numbers, one for each robot, got [1, 1, 2, 3]",
+        ),
         (edit_document("session", "failed", to={"x": [1.0, 1.0]}), "run.json: session.failed.x: "),
         (
             edit_document("session", "failed", to={"4": [1.0]}),
