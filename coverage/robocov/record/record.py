@@ -17,7 +17,15 @@ from robocov.controllers.gains import Value
 from robocov.controllers.registry import update_gain_names
 from robocov.drawing import Drawable
 from robocov.environment import Environment
-from robocov.errors import InputError, OutputError, ParameterError, describe_error, format_count, quote
+from robocov.errors import (
+    InputError,
+    OutputError,
+    ParameterError,
+    describe_error,
+    format_count,
+    is_number,
+    quote,
+)
 from robocov.files.documents import read_document
 from robocov.files.result_folder import complete_commit, require_result
 from robocov.files.result_names import RECORD_FILE, RUN_FILE
@@ -264,11 +272,11 @@ class Record(Drawable):
         Raises
         ------
         ParameterError
-            If the time is outside the run by more than a control period.
+            If the time is not a number, or is outside the run by more than a control period.
         """
         first = float(self.time[0])
         last = float(self.time[-1])
-        if not first - self.dt <= time <= last + self.dt:
+        if not is_number(time) or not first - self.dt <= time <= last + self.dt:
             raise ParameterError(f"time: expected a number from {first:g} to {last:g} s, got {quote(time)}")
         return self.snapshot(int(np.abs(self.time - time).argmin()))
 
@@ -287,9 +295,9 @@ class Record(Drawable):
         Raises
         ------
         ParameterError
-            If the time is before the start of the run.
+            If the time is not a number, or is before the start of the run.
         """
-        if not time >= self.time[0] - TIME_ROUNDING_S:
+        if not is_number(time) or not time >= self.time[0] - TIME_ROUNDING_S:
             raise ParameterError(f"time: expected a number of at least {self.time[0]:g} s, got {quote(time)}")
         step_count = int(np.searchsorted(self.time, time + TIME_ROUNDING_S, side="right"))
         return self._select_steps(slice(step_count))

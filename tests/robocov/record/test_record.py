@@ -513,7 +513,7 @@ class TestSamples:
         # The earlier one of two equally near samples is returned.
         assert record.thin(0.0).at(1.0).time == 0.0
         np.testing.assert_array_equal(record.at(2.0).positions, record.positions[-1])
-        for time in (-0.1, 2.1, np.nan):
+        for time in (-0.1, 2.1, np.nan, "1"):
             with pytest.raises(ParameterError, match="time: expected a number from 0 to 2 s"):
                 record.at(time)
 
@@ -525,7 +525,7 @@ class TestSamples:
         for name in ARRAYS:
             assert getattr(excerpt, name).tobytes() == getattr(expected, name).tobytes()
         assert record.until(99.0).time.tolist() == record.time.tolist()
-        for time in (-0.1, np.nan):
+        for time in (-0.1, np.nan, "1"):
             with pytest.raises(ParameterError, match="time: expected a number of at least 0 s"):
                 record.until(time)
 
