@@ -21,7 +21,7 @@ from robocov.environment.packing import (
     pack_lattice,
     pack_randomly,
 )
-from robocov.errors import StartError, format_count, is_number, quote
+from robocov.errors import StartError, format_count, format_position, is_number, quote
 from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray, Point
 
@@ -278,7 +278,7 @@ class Start:
         distances = shapely.distance(shapely.points(points), self.free.boundary)
         is_inside = shapely.contains_properly(self.free, shapely.points(points))
         for k in np.flatnonzero(~is_inside | (distances < radius)).tolist():
-            location = f"positions[{k}] = [{points[k, 0]:g}, {points[k, 1]:g}]"
+            location = f"positions[{k}] = {format_position(points[k, 0], points[k, 1])}"
             if not is_inside[k]:
                 raise self._build_error(f"{location} is inside an obstacle or outside the boundary")
             raise self._build_error(

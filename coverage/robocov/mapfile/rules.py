@@ -183,7 +183,7 @@ def _find_position_issues(environment: Environment, name: str, start: PointsStar
     points = np.asarray(start.positions, dtype=float)
     is_free = shapely.contains_properly(environment.free, shapely.points(points))
     for k in np.flatnonzero(~is_free).tolist():
-        position = f"[{points[k, 0]:g}, {points[k, 1]:g}]"
+        position = format_position(points[k, 0], points[k, 1])
         message = f"{position} is inside an obstacle or outside the boundary, expected a free position"
         yield Issue.at_path((*path, k), message)
     if len(np.unique(points, axis=0)) < len(points):

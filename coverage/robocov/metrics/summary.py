@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from robocov.errors import format_position
 from robocov.metrics.advice import advise
 from robocov.metrics.clearance import compute_clearances, count_contacts
 from robocov.metrics.communication import compute_sent_rate
@@ -115,16 +116,10 @@ def _describe_moved_joins(record: Record) -> list[str]:
     notes = []
     for joined in record.joined:
         if joined.offset >= MIN_REPORTED_OFFSET_M:
-            position = _format_point(joined.position)
-            requested = _format_point(joined.requested_position)
+            position = format_position(*joined.position)
+            requested = format_position(*joined.requested_position)
             notes.append(
-                f"Robot {joined.robot} joined at {joined.time:.4g} s at {position}, "
+                f"Robot {joined.robot} joined at {joined.time:g} s at {position}, "
                 f"{joined.offset:.2g} m from {requested}, which is too close to a wall or another robot."
             )
     return notes
-
-
-def _format_point(point: tuple[float, float]) -> str:
-    """Format a point for a note, in meters."""
-    x, y = point
-    return f"[{x:.4g}, {y:.4g}]"

@@ -9,7 +9,7 @@ import shapely
 
 from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Environment
-from robocov.errors import ParameterError, format_count, format_position, is_number, quote
+from robocov.errors import ParameterError, format_bound, format_count, format_position, is_number, quote
 from robocov.team import Team
 
 MIN_DT_S = 1e-4
@@ -143,8 +143,8 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
             expected = "expected a time above 0 s for a robot that joins at a given position"
             raise ParameterError(f"{prefix}: {expected}, got robot {join.robot} at {join.time:g} s")
         if not environment.boundary_polygon.covers(shapely.Point(x, y)):
-            left, bottom, right, top = environment.boundary_polygon.bounds
+            left, bottom, right, top = map(format_bound, environment.boundary_polygon.bounds)
             inside = f"inside the boundary of map {environment.name!r}"
-            extent = f"x from {left:g} to {right:g} m, y from {bottom:g} to {top:g} m"
+            extent = f"x from {left} to {right} m, y from {bottom} to {top} m"
             got = f"got {format_position(x, y)} for robot {join.robot}"
             raise ParameterError(f"{prefix}: expected a position {inside} ({extent}), {got}")

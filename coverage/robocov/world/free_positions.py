@@ -6,7 +6,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import compute_lengths
 from robocov.environment import Environment, Point, find_nearest_inside
-from robocov.errors import StartError
+from robocov.errors import StartError, format_position
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.potential import compute_spread_directions
 from robocov.team import Team
@@ -183,7 +183,7 @@ def require_free_starts(
         raise StartError(f"starts[{i}]: expected finite numbers, got {positions[i].tolist()}")
     wall_distances = _compute_wall_distances(environment, positions)
     for i in np.flatnonzero(is_present & (wall_distances < team.radius - tolerance)).tolist():
-        start = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
+        start = f"starts[{i}] = {format_position(positions[i, 0], positions[i, 1])}"
         if wall_distances[i] < 0.0:
             raise StartError(
                 f"{start} is inside an obstacle or outside the boundary of map {environment.name!r}"

@@ -89,7 +89,7 @@ def test_uniform_starts_cover_the_free_space(cluttered: Environment) -> None:
         (((1.0, 1.0),), 2, "expected at most 1 robot, one for each of its positions, got 2"),
         (((1.0, 1.0), (1.1, 1.0)), 2, r"positions\[0\] and positions\[1\] are 0.1 m apart"),
         (((0.05, 1.0),), 1, r"positions\[0\] = \[0.05, 1\] is 0.05 m from a wall"),
-        (((11.0, 1.0),), 1, "inside an obstacle or outside the boundary"),
+        (((385123.25, 1.0),), 1, r"\[385123.25, 1\] is inside an obstacle or outside the boundary"),
     ],
 )
 def test_given_positions_are_checked(positions, n: int, message: str) -> None:

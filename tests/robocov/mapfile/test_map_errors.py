@@ -177,8 +177,8 @@ GEOMETRIC = [
         "starts.given.positions[1]: [7, 2] is inside an obstacle or outside",
     ),
     (
-        edit("starts", "given", "positions", 1, [70, 2]),
-        "starts.given.positions[1]: [70, 2] is inside",
+        edit("starts", "given", "positions", 1, [385123.25, 2]),
+        "starts.given.positions[1]: [385123.25, 2] is inside",
     ),
     (
         edit("starts", "given", "positions", 1, [1, 1]),

@@ -218,6 +218,7 @@ def test_invalid_forces_of_a_controller_are_rejected(
     [
         ([[3.0, 2.0]], r"starts\[0\] = \[3, 2\] is inside an obstacle"),
         ([[1.0, 1.0], [2.0, 8.0]], r"starts\[1\] = \[2, 8\] is inside an obstacle or outside the boundary"),
+        ([[385123.25, 1.0]], r"starts\[0\] = \[385123.25, 1\] is inside an obstacle or outside"),
         ([[1.0, 0.05]], r"starts\[0\] = \[1, 0.05\] is 0.05 m from a wall"),
         ([[1.0, 1.0], [1.1, 1.0]], r"starts\[0\] and starts\[1\] are 0.1 m apart"),
         ([[np.nan, 1.0]], r"starts\[0\]"),

@@ -12,7 +12,7 @@ from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError
-from robocov.metrics import compute_clearances, compute_path_lengths
+from robocov.metrics import CostHistory, compute_clearances, compute_path_lengths, summarize
 from robocov.metrics.advice import advise
 from robocov.metrics.run_metrics import compute_run_metrics
 from robocov.record import Record
@@ -55,6 +55,15 @@ def test_moved_joining_positions_are_recorded(tmp_path: Path) -> None:
     np.testing.assert_array_equal(loaded.traveled, record.traveled)
 
 
+def test_notes_contain_positions_to_the_millimeter() -> None:
+    joined = JoinedRobot(3, 1234.5, (385123.25, 1.0), (385123.25, 1.5))
+    record = replace(run_with_joins(duration=0.1), joined=(joined,))
+    value = np.array([1.0])
+    history = CostHistory(time=np.zeros(1), mean_distance=value, cost=value, uncovered_area=value)
+    note = "Robot 3 joined at 1234.5 s at [385123.25, 1], 0.5 m from [385123.25, 1.5], which is too close"
+    assert summarize(record, history)["notes"][0].startswith(note)
+
+
 def test_robots_with_enough_space_join_at_the_requested_position() -> None:
     (joined,) = run_with_joins((3, 1.0, (19.0, 9.0))).joined
     assert joined == JoinedRobot(3, pytest.approx(1.0), (19.0, 9.0), (19.0, 9.0))
@@ -81,6 +90,17 @@ def test_joining_positions_outside_the_map_are_rejected(place: tuple[float, floa
         ParameterError, match=r"joins\[0\]: expected a position inside the boundary of map 'room'"
     ):
         run_with_joins((3, 1.0, place))
+
+
+def test_the_message_about_a_position_outside_the_map_contains_exact_coordinates() -> None:
+    x = 385000.25
+    y = 5123456.5
+    field = Environment("field", ((x, y), (x + 20, y), (x + 20, y + 10), (x, y + 10)))
+    conditions = Conditions(joins=[(1, 1.0, (x - 1, y))])
+    with pytest.raises(ParameterError) as caught:
+        Simulation(field, Lloyd(), STARTS + [x, y], dt=0.05, conditions=conditions)
+    assert "(x from 385000.25 to 385020.25 m, y from 5123456.5 to 5123466.5 m)" in str(caught.value)
+    assert "got [384999.25, 5123456.5] for robot 1" in str(caught.value)
 
 
 def test_joining_positions_require_a_time_after_the_start() -> None:
