@@ -319,8 +319,8 @@ class Environment(Drawable):
         starts.setdefault("uniform", UniformStart())
         if name is None:
             name = next(iter(starts))
-        if name not in starts:
-            raise StartError(f"map {self.name!r}: {describe_unknown_name('start', name, starts)}")
+        if not isinstance(name, str) or name not in starts:
+            raise StartError(f"map {self.name!r}: {describe_unknown_name('start', str(name), starts)}")
         return Start(name, starts[name], self.free)
 
 

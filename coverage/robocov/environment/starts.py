@@ -207,7 +207,13 @@ class Start:
         -------
         int
             0 if not even one robot fits.
+
+        Raises
+        ------
+        StartError
+            If the radius is out of range.
         """
+        self._require_radius(radius)
         if isinstance(self.spec, PointsStart):
             return len(self.spec.positions)
         area = self.compute_center_area(radius)

@@ -32,8 +32,10 @@ from robocov.errors import (
     format_count,
     format_path,
     format_position,
+    require_number,
     summarize_names,
 )
+from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray
 
 MANY_VERTICES = 5000
@@ -183,7 +185,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     Raises
     ------
     ParameterError
-        If `environment` is not a map.
+        If `environment` is not a map, or the radius is out of range.
 
     See Also
     --------
@@ -196,6 +198,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     100.0
     """
     require_environment(environment)
+    limits = TEAM_PARAMETERS["radius"]
+    require_number("radius", radius, limits.minimum, limits.maximum, limits.unit)
     gap = find_narrowest_gap(environment.free)
     density = environment.density
     density_kind = None

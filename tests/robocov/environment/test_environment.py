@@ -99,6 +99,9 @@ def test_starts_are_found_by_name(cluttered: Environment) -> None:
     assert cluttered.start().name == "corner"
     with pytest.raises(StartError, match=r"unknown start 'corner2': did you mean 'corner'\?"):
         cluttered.start("corner2")
+    for name in (3, ["corner"]):
+        with pytest.raises(StartError, match="unknown start "):
+            cluttered.start(name)  # type: ignore[arg-type]
     assert Environment("bare", SQUARE).start().name == "uniform"
     assert cluttered.start("uniform").sample(3).shape == (3, 2)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
@@ -123,11 +125,13 @@ def test_suggestions_suit_the_start() -> None:
 
 
 @pytest.mark.parametrize("radius", ["a", None, True, 0.0, 1e-200, np.nan, np.inf])
-def test_invalid_radii_are_rejected(radius: object) -> None:
-    with pytest.raises(
-        StartError, match=r"start 'all': radius: expected a number from 0\.001 to 1000 m, got "
-    ):
-        Start("all", UniformStart(), SQUARE).sample(2, radius=radius)  # type: ignore[arg-type]
+def test_invalid_radii_are_rejected(radius: Any) -> None:
+    start = Start("all", UniformStart(), SQUARE)
+    message = r"start 'all': radius: expected a number from 0\.001 to 1000 m, got "
+    with pytest.raises(StartError, match=message):
+        start.sample(2, radius=radius)
+    with pytest.raises(StartError, match=message):
+        start.estimate_capacity(radius)
 
 
 def test_a_disc_that_only_touches_the_space_of_centers_has_no_space() -> None:

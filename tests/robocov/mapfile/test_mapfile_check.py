@@ -50,6 +50,12 @@ def test_the_measures_of_a_map_are_exact() -> None:
     assert report.narrowest_gap.width == pytest.approx(0.8, abs=1e-3)
 
 
+@pytest.mark.parametrize("radius", [0.0, -1.0, float("nan"), "wide"])
+def test_invalid_radii_are_rejected(radius: Any) -> None:
+    with pytest.raises(ParameterError, match=r"radius: expected a number from 0\.001 to 1000 m, got "):
+        check_map(build_room(), radius)
+
+
 @pytest.mark.parametrize(
     ("count", "expected"), [(5000, "about 2 seconds"), (10_891, "7 seconds"), (50_000, "about 3 minutes")]
 )
