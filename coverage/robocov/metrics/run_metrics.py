@@ -50,7 +50,8 @@ class RunMetrics:
     sensed_area : (K,) array, m²
         Free area within the sensing range of a robot and in its line of sight.
     range_area : (K,) array, m²
-        Free area within the sensing range of a robot, regardless of walls (blanket coverage by discs).
+        Free area within the sensing range of a robot, regardless of walls (blanket coverage by discs). If the
+        ranges of all robots are infinite, only components of the free space that contain a robot count.
     visible_area : (K,) array, m²
         Free area in the line of sight of a robot, at any distance (as in the art gallery problem).
     work : (K,) array, J

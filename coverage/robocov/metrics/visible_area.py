@@ -43,7 +43,10 @@ class CoveredAreas(NamedTuple):
     sensed: float
     """Area within the sensing range of a robot and in its line of sight."""
     within_range: float
-    """Area within the sensing range of a robot, regardless of walls."""
+    """Area within the sensing range of a robot, regardless of walls.
+
+    If the ranges of all robots are infinite, only components of the free space that contain a robot count.
+    """
     visible: float
     """Area in the line of sight of a robot, at any distance."""
 
