@@ -151,28 +151,32 @@ def _copy_message(message: Message) -> Message:
         return message
 
 
-def check_forces(values: Any, robot_count: int, name: str) -> FloatArray:
+def check_forces(values: Any, shape: tuple[int, ...], name: str) -> FloatArray:
     """Check forces that do not come from a controller, and return them as an array of floats.
 
     Parameters
     ----------
-    values : array-like of shape (robot_count, 2), N
+    values : array-like, N
         The forces.
-    robot_count : int
-        Number of robots.
+    shape : tuple of int
+        Expected shape, such as (n, 2) for n robots.
     name : str
         Name of the forces in messages.
 
     Returns
     -------
-    (robot_count, 2) array, N
+    array of this shape, N
 
     Raises
     ------
     ParameterError
         If the forces are not finite numbers of that shape.
     """
-    forces = _to_rows(values, robot_count, name)
+    forces = to_numbers(values)
+    if forces is None:
+        raise ParameterError(f"{name}: expected numbers of shape {shape}, got {quote(values)}")
+    if forces.shape != shape:
+        raise ParameterError(f"{name}: expected an array of shape {shape}, got shape {forces.shape}")
     if not _is_finite(forces):
         raise ParameterError(f"{name}: expected finite forces in newtons, got {quote(forces.tolist())}")
     return forces

@@ -223,7 +223,8 @@ class SimulationBatch:
             next_memories = decision.memories
             messages = decision.messages
         else:
-            joint_forces = self._check_forces(forces)
+            shape = (len(self), len(self.team), 2)
+            joint_forces = check_forces(forces, shape, "forces").reshape(len(self._joint_team), 2)
         next_inboxes, sent_bytes = self._send_messages(messages)
         # Change the state only after everything that can fail.
         self._world.step(joint_forces, self.dt)
@@ -294,14 +295,6 @@ class SimulationBatch:
     def _require_run(self, run: Any) -> int:
         """Return the index of a run as an int; raise ParameterError unless there is such a run."""
         return int(require_number("run", run, 0, len(self) - 1, whole=True))
-
-    def _check_forces(self, forces: Any) -> FloatArray:
-        """Check forces passed to `step`, and return them with one row for each robot of all runs."""
-        shape = (len(self), len(self.team), 2)
-        if np.shape(forces) != shape:
-            raise ParameterError(f"forces: expected an array of shape {shape}, got {np.shape(forces)}")
-        row_count = len(self._joint_team)
-        return check_forces(np.asarray(forces).reshape(row_count, 2), row_count, "forces")
 
     def _get_graphs(self) -> list[Neighbors]:
         """Return the communication graph of each run in this step."""

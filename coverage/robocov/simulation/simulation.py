@@ -237,9 +237,9 @@ class Simulation:
             If there is no space for a robot that joins. The robots have moved then, but time, memory and
             messages have not changed, so that the simulation must not be continued.
         """
-        robot_count = len(self.team)
+        shape = (len(self.team), 2)
         if external_forces is not None:
-            external_forces = check_forces(external_forces, robot_count, "external_forces")
+            external_forces = check_forces(external_forces, shape, "external_forces")
         next_memory = self.memory
         messages: Sequence[Sequence[Message]] = ()
         if forces is None:
@@ -248,7 +248,7 @@ class Simulation:
             next_memory = decision.memory
             messages = decision.messages
         else:
-            forces = check_forces(forces, robot_count, "forces")
+            forces = check_forces(forces, shape, "forces")
         inbox = self.inbox
         if inbox is not None:
             # Deliver the messages of this step, even if `forces` replaces the decision.

@@ -524,7 +524,8 @@ class TestChanges:
             simulation.with_changes(team=Team.homogeneous(3))
         with pytest.raises(StartError, match=r"velocities: expected finite \[x, y\] for each robot"):
             simulation.with_changes(velocities=np.full((6, 2), np.nan))
-        with pytest.raises(ParameterError, match=r"external_forces of shape \(2, 2\)"):
+        message = r"external_forces: expected an array of shape \(6, 2\), got shape \(2, 2\)"
+        with pytest.raises(ParameterError, match=message):
             simulation.step(np.zeros((2, 2)))
         with pytest.raises(ParameterError, match=r"external_forces: .* finite forces in newtons"):
             simulation.step(np.full((6, 2), np.inf))
@@ -549,7 +550,7 @@ class TestChanges:
         driven.step(forces=np.zeros((6, 2)))
         original.step()
         assert driven.velocities.tobytes() != original.velocities.tobytes()
-        with pytest.raises(ParameterError, match=r"forces of shape \(2, 2\)"):
+        with pytest.raises(ParameterError, match=r"forces: expected an array of shape \(6, 2\), got "):
             driven.step(forces=np.zeros((2, 2)))
         with pytest.raises(ParameterError, match=r"forces: .* finite forces in newtons"):
             driven.step(forces=np.full((6, 2), np.inf))

@@ -181,8 +181,11 @@ def test_given_forces_replace_those_of_the_controller() -> None:
         alone.step(forces=forces[1])
     assert batch.positions[0].tobytes() == starts[0].tobytes()
     assert batch.positions[1].tobytes() == alone.positions.tobytes()
-    with pytest.raises(ParameterError, match=r"forces: expected an array of shape \(2, 2, 2\), got \(4, 2\)"):
+    with pytest.raises(ParameterError, match=r"array of shape \(2, 2, 2\), got shape \(4, 2\)"):
         batch.step(forces=forces.reshape(4, 2))
+    for values in ("east", [[[0.0, 0.0], [0.0]], [[0.0, 0.0], [0.0, 0.0]]]):
+        with pytest.raises(ParameterError, match=r"^forces: expected numbers of shape \(2, 2, 2\), got "):
+            batch.step(forces=values)  # type: ignore[arg-type]
 
 
 def test_a_batch_has_runs_of_equal_size_that_fit() -> None:
