@@ -484,6 +484,25 @@ def to_floats(
         raise error_type(_describe_mismatch(name, values, expected)) from None
 
 
+def require_seed(name: str, value: object) -> None:
+    """Raise an error unless a value is a seed of random numbers.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter in the message.
+    value : object
+        The value to check.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a whole number of at least 0.
+    """
+    if not is_number(value, Integral) or value < 0:
+        raise ParameterError(f"{name}: expected a whole number of at least 0, got {quote(value)}")
+
+
 def require_type(name: str, value: object, kind: type, expected: str) -> None:
     """Raise an error unless a value has a type.
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from numbers import Integral
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
 from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
 from robocov.conditions.random_streams import FAILURE_STREAM, create_generator
-from robocov.errors import ParameterError, is_number, quote, require_number
+from robocov.errors import ParameterError, quote, require_number, require_seed
 from robocov.typing import BoolArray, FloatArray
 
 TIME_TOLERANCE_S = 1e-9
@@ -143,10 +142,7 @@ class Conditions:
             object.__setattr__(self, name, number)
         object.__setattr__(self, "failures", build_events("failures", Failure, self.failures))
         object.__setattr__(self, "joins", build_events("joins", Join, self.joins))
-        if not is_number(self.seed, Integral) or self.seed < 0:
-            raise ParameterError(
-                f"conditions.seed: expected a whole number of at least 0, got {quote(self.seed)}"
-            )
+        require_seed("conditions.seed", self.seed)
         if self.density not in get_args(DensityKnowledge):
             raise ParameterError(f"conditions.density: expected known or sensed, got {quote(self.density)}")
         self._check_forget_after()

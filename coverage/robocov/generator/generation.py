@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from numbers import Integral
 from typing import TypeAlias
 
 import numpy as np
@@ -25,9 +24,8 @@ from robocov.errors import (
     MapError,
     ParameterError,
     describe_unknown_name,
-    is_number,
-    quote,
     require_number,
+    require_seed,
 )
 from robocov.generator.blocks import build_town
 from robocov.generator.caves import build_cave
@@ -199,8 +197,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     >>> rc.generate_map(3, kind="polygons", obstacles=4)
     <Environment polygons 3, 10 x 10 m, 4 obstacles>
     """
-    if not is_number(seed, Integral) or seed < 0:
-        raise ParameterError(f"seed: expected a whole number of at least 0, got {quote(seed)}")
+    require_seed("seed", seed)
     if not isinstance(kind, str) or kind not in GENERATORS:
         raise ParameterError(describe_unknown_name("kind of map", str(kind), GENERATORS))
     map_kind = GENERATORS[kind]

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.environment.packing import pack_densely
-from robocov.errors import ParameterError, is_number, quote, require_number
+from robocov.errors import ParameterError, require_number, require_seed
 from robocov.k_median import apply_best_swaps, run_lloyd, seed_sources
 from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
@@ -255,8 +254,7 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
     """Raise ParameterError if a parameter of `find_optimum` is out of range."""
     require_number("robots", robots, 1, MAX_ROBOTS, whole=True)
     require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
-    if not (is_number(seed, Integral) and seed >= 0):
-        raise ParameterError(f"seed: expected a whole number of at least 0, got {quote(seed)}")
+    require_seed("seed", seed)
     limits = TEAM_PARAMETERS["radius"]
     require_number("radius", radius, limits.minimum, limits.maximum, limits.unit)
 

@@ -12,7 +12,7 @@ from robocov.controllers import Controller, get_gain_values, get_recorded_name
 from robocov.controllers.gains import Value
 from robocov.controllers.individual import unwrap_controller
 from robocov.environment import Environment
-from robocov.errors import ParameterError, quote, to_one_line
+from robocov.errors import ParameterError, quote, require_seed, require_type, to_one_line
 from robocov.observation import Snapshot
 from robocov.record.record import Record
 from robocov.record.record_arrays import STEERING, list_array_names
@@ -46,7 +46,7 @@ class Recorder:
     Raises
     ------
     ParameterError
-        If a gain of the controller cannot be recorded.
+        If a gain of the controller, the start or the seed cannot be recorded.
 
     Examples
     --------
@@ -71,6 +71,10 @@ class Recorder:
     conditions: Conditions | None = None
 
     def __post_init__(self) -> None:
+        if self.start is not None:
+            require_type("start", self.start, str, "the name of a start, or None")
+        if self.seed is not None:
+            require_seed("seed", self.seed)
         if self.name is None:
             self.name = get_recorded_name(self.controller)
         self._gains = get_gain_values(unwrap_controller(self.controller))
@@ -129,6 +133,7 @@ class Recorder:
             label=to_one_line(self.controller.label),
             gains=self._gains,
             start=self.start,
+            # JSON has no numbers of NumPy.
             seed=None if self.seed is None else int(self.seed),
             dt=self.dt,
             time=np.array(self._times),

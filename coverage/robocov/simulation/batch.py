@@ -15,7 +15,7 @@ from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
 from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment, require_environment
-from robocov.errors import ParameterError, StartError, format_count, require_number, to_floats
+from robocov.errors import ParameterError, StartError, format_count, require_number, require_seed, to_floats
 from robocov.observation import Decision, Message, Observations, Scans, Snapshot, check_forces
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
@@ -406,11 +406,14 @@ class SimulationBatch:
         Raises
         ------
         ParameterError
-            If the duration is negative or not finite, there is not one seed for each run, or the controller
-            fails.
+            If the duration is negative or not finite, there is not one valid seed for each run, or the
+            controller fails.
         """
-        if seeds is not None and len(seeds) != len(self):
-            raise ParameterError(f"seeds: expected {len(self)}, one for each run, got {len(seeds)}")
+        if seeds is not None:
+            if len(seeds) != len(self):
+                raise ParameterError(f"seeds: expected {len(self)}, one for each run, got {len(seeds)}")
+            for run, seed in enumerate(seeds):
+                require_seed(f"seeds[{run}]", seed)
         steps = count_steps(duration, self.dt)
         recorder = Recorder(self.environment, self._joint_team, self.controller, self.dt, start=start)
         recorder.add(self._to_snapshot())
@@ -422,8 +425,8 @@ class SimulationBatch:
         joint_record = recorder.record()
         records = []
         for run, run_bytes in enumerate(np.transpose(sent_bytes)):
-            seed = None if seeds is None else int(seeds[run])
-            record = self._extract_record(joint_record, run, seed=seed)
+            run_seed = None if seeds is None else int(seeds[run])
+            record = self._extract_record(joint_record, run, seed=run_seed)
             # Records of runs without messages have no sent bytes.
             if run_bytes.any():
                 record = replace(record, sent_bytes=run_bytes.copy())

@@ -399,7 +399,8 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If the duration is negative or not finite, or the controller fails.
+            If the duration is negative or not finite, the start or the seed cannot be recorded, or the
+            controller fails.
         StartError
             If there is no space for a robot that joins.
 

@@ -8,6 +8,7 @@ import sys
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -149,6 +150,23 @@ def test_gains_of_individual_controllers_are_recorded(empty: Environment) -> Non
 
     record = Simulation(empty, IndividualControllerAdapter(Drift(pull=0.25)), [[2.0, 2.0]]).run(0.1)
     assert record.gains == {"pull": 0.25}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"seed": "first"}, "seed: expected a whole number of at least 0, got 'first'"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
+        ({"start": 3}, "start: expected the name of a start, or None, got 3"),
+    ],
+)
+def test_runs_that_could_not_be_loaded_again_do_not_start(
+    empty: Environment, options: dict[str, Any], message: str
+) -> None:
+    simulation = Simulation(empty, Rpf(), [[1.0, 1.0]])
+    with pytest.raises(ParameterError, match=message):
+        simulation.run(0.1, **options)
+    assert simulation.time == 0.0
 
 
 def test_records_of_controllers_without_goals_have_no_goals(empty: Environment) -> None:

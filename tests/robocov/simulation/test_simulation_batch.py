@@ -204,6 +204,9 @@ def test_a_batch_has_runs_of_equal_size_that_fit() -> None:
         batch.restart(1, positions[:1])
     with pytest.raises(ParameterError, match="seeds: expected 2, one for each run, got 1"):
         batch.run(0.1, seeds=[1])
+    with pytest.raises(ParameterError, match=r"seeds\[1\]: expected a whole number of at least 0, got 'x'"):
+        batch.run(0.1, seeds=[1, "x"])  # type: ignore[list-item]
+    assert batch.time == 0.0
     assert len(batch) == 2
     assert repr(batch) == "<SimulationBatch rapf on Rooms, 2 runs of 3 robots, at 0.00 s>"
 
