@@ -56,7 +56,7 @@ def _build_conditions_model() -> Any:
         "failures": (list[_Failure], ...),
         "joins": (list[_Join], ...),
         "seed": (Seed, ...),
-        "density": (DensityKnowledge, "known"),
+        "density": (Annotated[DensityKnowledge, expect('"known" or "sensed"')], "known"),
     }
     for name, parameter in PARAMETERS.items():
         fields[parameter.json_key] = _build_number_field(
@@ -65,10 +65,11 @@ def _build_conditions_model() -> Any:
             allow_null=parameter.may_be_null,
             is_required=name not in _LATER_CONDITIONS,
         )
-    return create_model("_Conditions", __base__=Document, **fields)
+    return create_model("ConditionsDocument", __base__=Document, **fields)
 
 
-_Conditions: Any = _build_conditions_model()
+ConditionsDocument: Any = _build_conditions_model()
+"""The conditions of a run, with all keys that `Conditions.to_dict` writes."""
 
 
 class _Controller(Document):
@@ -126,7 +127,7 @@ class RunDocument(Document):
     dt_s: Seconds
     duration_s: Time = 0.0
     lattice: Annotated[int | None, Field(ge=2, le=2048), expect("a whole number from 2 to 2048")] = None
-    conditions: _Conditions | None = None
+    conditions: ConditionsDocument | None = None
     events: list[JoinEvent] = Field([])
     session: _Session = _Session()
     versions: dict[str, str] = Field({})

@@ -47,7 +47,7 @@ from robocov.files.strictjson import parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov.mapfile import find_map_file, from_json, list_bundled_maps, load_map, to_json
 from robocov.record import Record, Recorder
-from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ScenarioDocument
+from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ConditionsEntry, ScenarioDocument
 from robocov.simulation import Simulation, TeamState, check_dt, check_joins
 from robocov.team import PARAMETERS, Team
 from robocov.typing import FloatArray
@@ -539,7 +539,7 @@ class Scenario:
                 steering=content.start_steering,
                 duration=content.duration_s,
                 dt=content.dt_s,
-                conditions=_read_conditions(content.conditions),
+                conditions=_read_conditions(content.conditions, source_name),
             )
         except (ParameterError, StartError) as error:
             raise InputError(f"{source_name}: {error}") from error
@@ -736,7 +736,7 @@ def _read_team(content: Mapping[str, Any]) -> Team:
     return Team.from_dict({**Team.homogeneous(DEFAULT_ROBOTS).to_dict(), **content})
 
 
-def _read_conditions(content: Mapping[str, Any] | None) -> Conditions | None:
+def _read_conditions(content: Mapping[str, Any] | None, source_name: str) -> Conditions | None:
     """Return the conditions of a document, in which every key may be missing."""
     if content is None:
         return None
@@ -746,4 +746,6 @@ def _read_conditions(content: Mapping[str, Any] | None) -> Conditions | None:
     for key in content:
         if key not in keys:
             raise ParameterError(f"conditions: {describe_unknown_name('key', key, keys)}")
-    return Conditions.from_dict({**Conditions().to_dict(), **content})
+    document = {**Conditions().to_dict(), **content}
+    validate_document({"conditions": document}, source_name, ConditionsEntry)
+    return Conditions.from_dict(document)

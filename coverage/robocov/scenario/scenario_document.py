@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field
 
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_S
 from robocov.files.documents import Document, expect
-from robocov.record.run_document import Point, Seconds, Seed, Time
+from robocov.record.run_document import ConditionsDocument, Point, Seconds, Seed, Time
 
 FORMAT = "robocov-scenario"
 """Name of the format."""
@@ -23,6 +23,12 @@ class ControllerEntry(Document):
 
     name: Annotated[str, Field(min_length=1), expect("a name")] = DEFAULT_CONTROLLER
     gains: dict[str, Annotated[float | str | bool | None, expect("a number, a word or null")]] = Field({})
+
+
+class ConditionsEntry(Document):
+    """The conditions of a scenario, after missing keys have received their defaults."""
+
+    conditions: ConditionsDocument
 
 
 class ScenarioDocument(Document):

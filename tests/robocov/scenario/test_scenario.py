@@ -309,6 +309,10 @@ def test_a_map_without_a_suffix_is_found_in_the_folder_of_the_document(tmp_path:
         ({"duration_s": -1}, r"^s: duration_s: expected a number of at least 0 \(s\), got -1"),
         ({"dt_s": 2}, r"^s: dt: expected a number from 0.0001 to 1 s, got 2"),
         ({"conditions": {"los": 1}}, r"^s: conditions: unknown key 'los': did you mean 'loss'\?"),
+        ({"conditions": {"loss": "1"}}, r"^s: conditions.loss: expected a number from 0 to 1, got \"1\""),
+        ({"conditions": {"joins": 3}}, r"^s: conditions.joins: expected a list, got 3"),
+        ({"conditions": {"joins": [{"robot": 1}]}}, r"^s: conditions.joins\[0\].time_s: missing"),
+        ({"conditions": {"density": "?"}}, r'^s: conditions.density: expected "known" or "sensed", got "\?"'),
     ],
 )
 def test_wrong_documents_are_explained(changes: dict[str, Any], message: str) -> None:
