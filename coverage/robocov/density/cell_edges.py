@@ -28,7 +28,7 @@ errors."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellEdges:
-    """The edges of all cells, sorted by cell, and counter-clockwise around each cell.
+    """The edges of all cells, sorted by cell. Each cell lies to the left of its edges.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class CellEdges:
     other_cells: IntArray
 
     def build_polygons(self, generators: FloatArray) -> list[FloatArray]:
-        """Build the polygon of each cell.
+        """Build the polygon of each cell, whose edges must be in order around the cell.
 
         Parameters
         ----------

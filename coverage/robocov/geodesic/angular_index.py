@@ -408,7 +408,7 @@ def _limit_horizon_of_last_bin(
     `max_squared_distance` the squared distance of the farthest point of the wall.
     """
     bin_count = index.heads.shape[1]
-    # Holds unless the wall starts and ends in the same bin or has already covered a full turn.
+    # False if the wall starts and ends in the same bin, or has already covered a full turn.
     has_partial_bin = bins.first_covered <= bins.end_covered < bins.first + bin_count
     k = _wrap_bin(bins.end_covered, bin_count)
     if has_partial_bin and max_squared_distance < index.squared_horizons[source, k]:

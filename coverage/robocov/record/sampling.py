@@ -35,7 +35,7 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     Parameters
     ----------
     time : (T,) array, s
-        Times of the steps, ascending.
+        Times of the steps, ascending. Multiples of 1/rate count from the first one.
     rate : float, Hz
         Number of steps to select per second; 0 selects only the first and the last one.
 
