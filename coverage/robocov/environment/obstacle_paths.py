@@ -101,12 +101,12 @@ class ObstaclePath:
         return np.asarray(np.array([x, y]) - points[0])
 
 
-def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
+def compute_swept_area(shape: BaseGeometry, path: ObstaclePath) -> BaseGeometry:
     """Compute the area that an obstacle sweeps on its path.
 
     Parameters
     ----------
-    polygon : Polygon, m
+    shape : Polygon or MultiPolygon, m
         The obstacle at time zero.
     path : ObstaclePath
         Path along which the obstacle moves.
@@ -121,8 +121,10 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
         points += path.points[:1]
     displacements = np.array(points, dtype=float)
     displacements = displacements - displacements[:1]
-    swept_areas = [_sweep(polygon, start, end) for start, end in pairwise(displacements)]
-    return shapely.union_all([polygon, *swept_areas])
+    swept_areas: list[BaseGeometry] = []
+    for polygon in shapely.get_parts(shape):
+        swept_areas += [_sweep(polygon, start, end) for start, end in pairwise(displacements)]
+    return shapely.union_all([shape, *swept_areas])
 
 
 def _sweep(polygon: Polygon, start: FloatArray, end: FloatArray) -> BaseGeometry:

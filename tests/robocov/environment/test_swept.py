@@ -12,6 +12,7 @@ from robocov.environment import (
     CircleObstacle,
     ObstaclePath,
     PolygonObstacle,
+    WallObstacle,
     compute_swept_area,
     find_overlaps,
     shift_obstacle,
@@ -48,6 +49,14 @@ def test_a_hole_is_swept_only_as_far_as_its_rim_moves() -> None:
     wide = PolygonObstacle(((0, 0), (4, 0), (4, 4), (0, 4)), (((1, 1), (3, 1), (3, 3), (1, 3)),))
     area = compute_swept_area(wide.polygon, ObstaclePath(((0, 0), (0.5, 0)), 1.0))
     assert area.area == pytest.approx(4.5 * 4 - 1.5 * 2)
+
+
+def test_a_wall_of_several_polygons_sweeps_the_areas_of_all() -> None:
+    wall = WallObstacle(((0.4, 0.6), (0.7, 0.6), (0.7, 0.5)), width=2.0)
+    assert wall.polygon.geom_type == "MultiPolygon"
+    area = compute_swept_area(wall.polygon, ObstaclePath(((0, 0), (5, 0)), 1.0))
+    parts = [compute_swept_area(part, ObstaclePath(((0, 0), (5, 0)), 1.0)) for part in wall.polygon.geoms]
+    assert area.equals(shapely.union_all(parts))
 
 
 @pytest.mark.parametrize("points", [(), ((1, 1),), ((1, 1), (1, 1))])
