@@ -106,7 +106,7 @@ class Raster(Density):
     interpolation: Interpolation = "bilinear"
 
     def __post_init__(self) -> None:
-        values = copy_read_only(self.values)
+        values = copy_read_only(to_floats("values", self.values, "rows of numbers"))
         shape = values.shape
         if values.ndim != 2 or not 1 <= min(shape) <= max(shape) <= MAX_RASTER_SIZE:
             raise ParameterError(

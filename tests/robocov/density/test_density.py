@@ -337,6 +337,7 @@ def test_densities_are_immutable_and_compare_by_value():
             "values: expected at least one",
         ),
         (lambda: Raster(np.ones(3), (0.0, 0.0, 1.0, 1.0)), "shape"),
+        (lambda: Raster([[1.0, 2.0], [3.0]], (0.0, 0.0, 1.0, 1.0)), "values: expected rows of numbers"),  # type: ignore[arg-type]
         (lambda: Raster(np.ones((1, MAX_RASTER_SIZE + 1)), (0.0, 0.0, 1.0, 1.0)), "shape"),
         (lambda: Raster(-np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0)), "from 0 to"),
         (lambda: Raster(np.ones((2, 2)), None), "extent: expected"),  # type: ignore[arg-type]
