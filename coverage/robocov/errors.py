@@ -5,6 +5,7 @@
     │   ├── MapError          a map file, with line, column and JSON path of the first issue
     │   ├── StartError        a start without space for the team
     │   └── ParameterError    a gain, a limit, the name of a controller
+    │       └── NoLayoutError no random map meets the requirements
     ├── ControllerEndedError  a user's controller tried to end Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
@@ -243,6 +244,10 @@ class ParameterError(InputError):
     Traceback (most recent call last):
     robocov.errors.ParameterError: team.max_speed: expected a number from 0.000001 to 1000, got -1.0 m/s
     """
+
+
+class NoLayoutError(ParameterError):
+    """No layout of a random map was found that meets the requirements; another seed may have one."""
 
 
 class ControllerEndedError(RobocovError):

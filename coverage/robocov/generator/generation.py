@@ -22,6 +22,7 @@ from robocov.environment import (
 )
 from robocov.errors import (
     MapError,
+    NoLayoutError,
     ParameterError,
     describe_unknown_name,
     require_number,
@@ -64,10 +65,6 @@ _SCORE_DECIMALS = 9
 """Decimal places to which scores are rounded, so that rounding errors do not decide between equal scores."""
 _GAP_TOLERANCE_M = 1e-6
 """Maximum rounding error of a measured gap."""
-
-
-class NoLayoutError(ParameterError):
-    """No layout was found that meets the requirements of a map; another seed may have one."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +181,9 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     Raises
     ------
     ParameterError
-        If a parameter is out of range, or no layout is found that meets all requirements.
+        If a parameter is out of range.
+    NoLayoutError
+        If no layout is found that meets all requirements. It is a ParameterError.
 
     See Also
     --------

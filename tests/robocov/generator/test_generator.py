@@ -18,7 +18,7 @@ from property_examples import count_examples
 
 from robocov import generator
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
-from robocov.errors import ParameterError
+from robocov.errors import NoLayoutError, ParameterError
 from robocov.generator import GENERATORS, generate_map
 from robocov.generator.request import BLOCKED_FRACTION_TOLERANCE
 from robocov.mapfile import dump_map, load_map, save_map, to_json
@@ -294,7 +294,7 @@ def test_parameters_out_of_range_are_named(parameters, message):
     ],
 )
 def test_impossible_requests_are_rejected(parameters):
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(NoLayoutError) as caught:
         generate_map(0, **parameters)
     obstacle_name = GENERATORS[parameters["kind"]].obstacle_name
     assert str(caught.value).startswith(
@@ -341,7 +341,7 @@ def test_layouts_of_registered_kinds_are_checked(layout, area, is_valid, monkeyp
         assert environment.obstacles == tuple(layout)
         assert environment.name == "custom 0"
     else:
-        with pytest.raises(ParameterError, match="layout of 6 blocks with a blocked fraction"):
+        with pytest.raises(NoLayoutError, match="layout of 6 blocks with a blocked fraction"):
             generate_map(0, kind="custom", area=area)
         # Each attempt has different random numbers.
         assert len(set(numbers)) == len(numbers) > 1

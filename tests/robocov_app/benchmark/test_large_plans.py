@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 import shapely
 
+from robocov.errors import NoLayoutError
 from robocov.mapfile.check import check_map
 from robocov_app.benchmark.maps.large_plans import LARGE_PLANS, build_large_plan
 from robocov_app.benchmark.maps.large_plans.drawing import Drawing, build_outline
 from robocov_app.benchmark.maps.large_plans.tunnels import draw_tunnels
+from robocov_app.benchmark.maps.plan_search import find_valid_map
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan
 
 SEEDS = range(7001, 7005)
 """One seed for each layout."""
@@ -40,6 +43,13 @@ def test_plans_depend_on_their_seed_only() -> None:
     assert build_large_plan("wards", 1) == build_large_plan("wards", 1)
     # Seeds 1 and 5 have the same layout.
     assert build_large_plan("wards", 1).boundary != build_large_plan("wards", 5).boundary
+
+
+def test_a_search_without_a_suitable_plan_fails() -> None:
+    # A start disc with a radius of 1 m does not fit in.
+    corridor = FloorPlan(boundary=((0.0, 0.0), (9.0, 0.0), (9.0, 1.5), (0.0, 1.5)), obstacles=[])
+    with pytest.raises(NoLayoutError, match="map corridors-5: none of 400 random plans is suitable"):
+        find_valid_map("corridors", 5, kind_number=0, sample_plan=lambda _: corridor, start_radius=1.0)
 
 
 def test_tunnels_have_loops_and_dead_ends() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import DiscStart, Environment, Point
-from robocov.errors import MapError, ParameterError
+from robocov.errors import MapError, NoLayoutError
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark.maps.plan_shapes import FloorPlan
 
@@ -56,7 +56,7 @@ def find_valid_map(
 
     Raises
     ------
-    ParameterError
+    NoLayoutError
         If no suitable plan is found with this seed.
     """
     for attempt in range(_MAX_ATTEMPTS):
@@ -72,7 +72,7 @@ def find_valid_map(
         # Reading the candidate as a map file checks it. If it is not valid, another plan is sampled.
         with suppress(MapError):
             return from_json(document, candidate.name)
-    raise ParameterError(
+    raise NoLayoutError(
         f"map {kind}-{seed}: none of {_MAX_ATTEMPTS} random plans is suitable. Try another seed."
     )
 

@@ -96,7 +96,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
 
     Raises
     ------
-    ParameterError
+    NoLayoutError
         If no plan with this seed is suitable.
     """
     return find_valid_map(

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError
+from robocov.errors import NoLayoutError, ParameterError
 from robocov.generator import GENERATORS, generate_map
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
@@ -169,7 +169,7 @@ def _sample_map(family: str, rng: np.random.Generator) -> NewMap:
                 environment = generate_map(seed, kind=family)
             else:
                 environment = build_floor_plan(family, seed)
-        except ParameterError:
+        except NoLayoutError:
             continue
         start_seed = int(rng.integers(_MAX_MAP_SEED))
         return NewMap(f"{family}-{seed}", family, start_seed, environment)

@@ -14,6 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import (
     InputError,
     MapError,
+    NoLayoutError,
     OutputError,
     ParameterError,
     describe_error,
@@ -152,8 +153,6 @@ def command(options: Arguments) -> None:
 
 def _build_map(task: _MapTask) -> Environment:
     """Build a map. Error messages name the option and, in a series of maps, the seed without a layout."""
-    from robocov.generator.generation import NoLayoutError
-
     try:
         return task.build()
     except ParameterError as error:

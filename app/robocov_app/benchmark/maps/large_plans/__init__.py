@@ -55,7 +55,7 @@ def build_large_plan(kind: str, seed: int) -> Environment:
 
     Raises
     ------
-    ParameterError
+    NoLayoutError
         If no suitable plan is found with this seed.
     """
     layout = seed % _LAYOUTS
