@@ -79,7 +79,7 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
             return []
         return [replace(item.shape, radius=radius)]
     grown = item.geometry.buffer(distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
-    return extract_polygons(grown, item.shape.name, item.shape.path)
+    return extract_polygons(grown, item.shape)
 
 
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
@@ -95,7 +95,7 @@ def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
     for item in items:
         if not inside.covers(item.geometry):
             remainder = _intersection(item.geometry, inside)
-            shapes[item.key] = extract_polygons(remainder, item.shape.name, item.shape.path)
+            shapes[item.key] = extract_polygons(remainder, item.shape)
     require(shapes, "no obstacle extends beyond the boundary")
     clipped_count = sum(map(bool, shapes.values()))
     removed_count = len(shapes) - clipped_count
@@ -118,7 +118,7 @@ def repair_outlines(sketch: Sketch, selection: Selection) -> Change:
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in sketch.obstacles:
         if (is_all or item.key in selection.items) and _is_broken(item.shape):
-            shapes[item.key] = extract_polygons(item.geometry, item.shape.name, item.shape.path)
+            shapes[item.key] = extract_polygons(item.geometry, item.shape)
     boundary = sketch.boundary
     if is_all or selection.boundary:
         boundary = _repair_boundary(sketch)
@@ -200,7 +200,7 @@ def _replace_items(
     lowest = items[0]
     polygons: list[Obstacle] = []
     for part in parts:
-        polygons += extract_polygons(part, lowest.shape.name, lowest.shape.path)
+        polygons += extract_polygons(part, lowest.shape)
     require(polygons, error)
     shapes: dict[int, Sequence[Obstacle]] = {item.key: () for item in items}
     shapes[lowest.key] = polygons

@@ -183,7 +183,7 @@ def convert_to_polygons(sketch: Sketch, selection: Selection) -> Change:
     for item in selection.list_items(sketch):
         if isinstance(item.shape, PolygonObstacle):
             continue
-        polygons = extract_polygons(item.geometry, item.shape.name, item.shape.path)
+        polygons = extract_polygons(item.geometry, item.shape)
         name = format_numbered_name(sketch, item.key)
         require(polygons, f"{name} has no area and cannot become a polygon")
         shapes[item.key] = polygons

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.environment import ObstaclePath, Point, PolygonObstacle, Ring
+from robocov.environment import Obstacle, Point, PolygonObstacle, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov.typing import FloatArray
 from robocov_app.editor.model import require
@@ -91,15 +91,18 @@ def enclose_boxes(boxes: Iterable[Box]) -> Box:
 
 
 def extract_polygons(
-    geometry: shapely.Geometry, name: str | None = None, path: ObstaclePath | None = None
+    geometry: shapely.Geometry, replaced: Obstacle | None = None
 ) -> tuple[PolygonObstacle, ...]:
-    """Convert the polygons of a geometry to obstacles with a name and a path, the largest first.
+    """Convert the polygons of a geometry to obstacles, the largest first.
 
-    Coordinates are rounded to tenths of a millimeter. Tiny polygons and holes are dropped.
+    They have the name and the path of the obstacle that they replace, if there is one. Coordinates are
+    rounded to tenths of a millimeter. Tiny polygons and holes are dropped.
     """
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_tiny(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
+    name = None if replaced is None else replaced.name
+    path = None if replaced is None else replaced.path
     polygons = []
     for part in map(shapely.orient_polygons, parts):
         rings = [part.exterior, *(hole for hole in part.interiors if not _is_tiny(hole))]
