@@ -107,6 +107,19 @@ class OsmData:
         """Return whether the position of a node is known."""
         return node_id in self._node_rows
 
+    def add_way_node(self, node_id: int, position: tuple[float, float] | None) -> None:
+        """Add the position of a node that a way contains (``out geom``), unless it is known.
+
+        Parameters
+        ----------
+        node_id : int
+        position : (longitude, latitude) or None
+            In degrees; None if the way does not contain the position.
+        """
+        if position is not None and not self.has_node(node_id):
+            longitude, latitude = position
+            self.add_node(node_id, longitude, latitude)
+
     def add_line(self, line: list[tuple[float, float] | None]) -> list[int]:
         """Add nodes that have no id in the file, and return new ids for them.
 
@@ -125,6 +138,18 @@ class OsmData:
             self.add_node(node_id, longitude, latitude)
             ids.append(node_id)
         return ids
+
+    def add_relation_way(self, way_id: int, line: list[tuple[float, float] | None]) -> None:
+        """Add a way whose nodes a relation contains (``out geom``), unless the way is known.
+
+        Parameters
+        ----------
+        way_id : int
+        line : list of (longitude, latitude) or None
+            Positions of the nodes, as in `add_line`; empty if the relation does not contain them.
+        """
+        if line and way_id not in self.ways:
+            self.add_element(OsmElement("way", way_id, members=self.add_line(line)))
 
     def add_element(self, element: OsmElement) -> None:
         """Add an element, unless it is a node without tags or position, or a relation that is not an area."""

@@ -97,7 +97,9 @@ class _XmlReader:
         elif self.element is None:
             return
         elif name == "nd" and self.depth == 3:
-            self._add_way_node(int(attributes["ref"]), _parse_position(attributes))
+            node_id = int(attributes["ref"])
+            self.element.members.append(node_id)
+            self.data.add_way_node(node_id, _parse_position(attributes))
         elif name == "nd":
             self.member_line.append(_parse_position(attributes))
         elif name == "member" and attributes["type"] == "way":
@@ -118,26 +120,11 @@ class _XmlReader:
             latitude = _parse_degrees(attributes, "lat")
             self.data.add_node(number, longitude, latitude)
 
-    def _add_way_node(self, number: int, position: tuple[float, float] | None) -> None:
-        """Add a node to the current way, and its position if the way contains it (``out geom``)."""
-        assert self.element is not None
-        self.element.members.append(number)
-        if position is not None and not self.data.has_node(number):
-            longitude, latitude = position
-            self.data.add_node(number, longitude, latitude)
-
-    def _end_member(self) -> None:
-        """Add the way of a relation that contains the positions of its nodes (``out geom``)."""
-        number = self.member_id
-        self.member_id = None
-        if number is not None and self.member_line and number not in self.data.ways:
-            members = self.data.add_line(self.member_line)
-            self.data.add_element(OsmElement("way", number, members=members))
-
     def _end_element(self, name: str) -> None:
         self.depth -= 1
-        if name == "member":
-            self._end_member()
+        if name == "member" and self.member_id is not None:
+            self.data.add_relation_way(self.member_id, self.member_line)
+            self.member_id = None
         if self.depth == 1 and self.element is not None:
             self.data.add_element(self.element)
             self.element = None
@@ -221,9 +208,7 @@ def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], loca
     if len(line) != len(numbers):
         return data.add_line(line)
     for number, point in zip(numbers, line, strict=True):
-        if point is not None and not data.has_node(number):
-            longitude, latitude = point
-            data.add_node(number, longitude, latitude)
+        data.add_way_node(number, point)
     return numbers
 
 
@@ -243,9 +228,9 @@ def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], locat
         if type(number) is not int:
             raise file.build_error((*member_location, "ref"), number, "a whole number")
         numbers.append(number)
-        if "geometry" in member and number not in data.ways:
+        if "geometry" in member:
             line = _parse_json_line(file, member["geometry"], (*member_location, "geometry"))
-            data.add_element(OsmElement("way", number, members=data.add_line(line)))
+            data.add_relation_way(number, line)
     return numbers
 
 
