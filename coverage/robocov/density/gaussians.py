@@ -21,6 +21,7 @@ accurate to rounding errors.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
@@ -44,8 +45,10 @@ closed form, the relative error of the polar moment is about 1e-16 divided by th
 _QUADRATURE_ORDER = 6
 """Number of nodes in each of two directions on the triangle between a generator and an edge."""
 _MIN_RELATIVE_DETERMINANT = 1e-9
-"""A covariance counts as singular if its determinant is at most this fraction of the product of its
+"""A covariance counts as nearly singular if its determinant is at most this fraction of the product of its
 diagonal."""
+CORRELATION_EXPECTED = "an absolute correlation of at most 1 - 5e-10"
+"""The same limit in messages. The fraction is 1 minus the square of the correlation."""
 
 
 class _CholeskyFactor(NamedTuple):
@@ -402,8 +405,8 @@ def _check_center(center: Any) -> Point:
 def _check_covariance(covariance: Any) -> Matrix:
     """Return a covariance as tuples of floats; raise a ParameterError if it is not valid."""
     expected = (
-        "a symmetric, positive definite 2 x 2 matrix in m² with variances from 1e-200 to 1e200 and an "
-        "absolute correlation of at most 1 - 5e-10"
+        "a symmetric, positive definite 2 x 2 matrix in m² with variances from 1e-200 to 1e200 and "
+        f"{CORRELATION_EXPECTED}"
     )
     entries = to_floats("covariance", covariance, expected)
     matrix = to_tuples(entries)
@@ -420,7 +423,21 @@ def _is_valid_covariance(matrix: Matrix) -> bool:
     min_variance = _MIN_SIGMA_M**2
     max_variance = _MAX_SIGMA_M**2
     has_valid_diagonal = min_variance <= a <= max_variance and min_variance <= d <= max_variance
-    if not (is_symmetric and has_valid_diagonal):
-        return False
+    return is_symmetric and has_valid_diagonal and not is_nearly_singular(matrix)
+
+
+def is_nearly_singular(matrix: Sequence[Sequence[float]]) -> bool:
+    """Return whether a matrix is singular, nearly singular or not positive definite.
+
+    Parameters
+    ----------
+    matrix : (2, 2) sequence
+        A symmetric matrix with a positive diagonal.
+
+    Returns
+    -------
+    bool
+    """
+    (a, b), (c, d) = matrix
     determinant = a * d - b * c
-    return determinant > _MIN_RELATIVE_DETERMINANT * a * d
+    return determinant <= _MIN_RELATIVE_DETERMINANT * a * d

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from robocov.density import MAX_RASTER_SIZE
+from robocov.density.gaussians import CORRELATION_EXPECTED, is_nearly_singular
 from robocov.errors import Issue, JsonPath, MapError, describe_unknown_name, find_similar_names, format_path
 from robocov.files.documents import build_document_error, check_header, describe_mismatch
 from robocov.mapfile.models import (
@@ -34,8 +35,6 @@ from robocov.mapfile.models import (
 
 NO_WEIGHT = "expected at least one weight above 0, got none"
 """Message about a density that is 0 everywhere."""
-_MIN_RELATIVE_DETERMINANT = 1e-9
-"""Minimum determinant of a covariance matrix, relative to the product of its diagonal."""
 _BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
 """Keys of the weight that all points have, by the kind of the density."""
 _EXPECTED = {name: key.expected for name, key in KEYS.items()} | {
@@ -167,8 +166,8 @@ def _find_weight_issues(model: DensityModel) -> Iterator[Issue]:
         elif peak.covariance is not None and not _is_covariance(peak.covariance):
             min_variance = f"({MIN_SIZE_M * 1000:g} mm)²"
             expected = (
-                f"a symmetric, positive definite matrix of at least {min_variance} in all directions with an "
-                "absolute correlation of at most 1 - 5e-10"
+                f"a symmetric, positive definite matrix of at least {min_variance} in all directions with "
+                f"{CORRELATION_EXPECTED}"
             )
             yield Issue.at_path((*path, "covariance"), describe_mismatch(expected, peak.covariance))
     has_base_weight = getattr(model, _BASE_WEIGHTS[model.kind]) > 0.0
@@ -182,8 +181,8 @@ def _is_covariance(matrix: list[list[float]]) -> bool:
     (a, b), (c, d) = matrix
     # The eigenvalues of [[a, b], [b, d]] are (a + d) / 2 plus or minus the length of ((a - d) / 2, b).
     smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
-    is_regular = a * d - b * c > _MIN_RELATIVE_DETERMINANT * a * d
-    return b == c and smaller_eigenvalue >= MIN_SIZE_M**2 and is_regular
+    is_symmetric = b == c
+    return is_symmetric and smaller_eigenvalue >= MIN_SIZE_M**2 and not is_nearly_singular(matrix)
 
 
 def _describe_choice(model: Model, first: str, second: str) -> str | None:
