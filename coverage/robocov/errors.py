@@ -406,7 +406,14 @@ def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
 
 
 def require_number(
-    name: str, value: Any, minimum: float, maximum: float, unit: str = "", *, whole: bool = False
+    name: str,
+    value: Any,
+    minimum: float,
+    maximum: float,
+    unit: str = "",
+    *,
+    whole: bool = False,
+    error_type: type[InputError] = ParameterError,
 ) -> float:
     """Return a value as a float, or raise an error unless it is a number in a range.
 
@@ -422,6 +429,8 @@ def require_number(
         Unit of the limits in the message.
     whole : bool
         Whether only whole numbers are accepted.
+    error_type : type
+        Class of the error to raise.
 
     Returns
     -------
@@ -429,8 +438,8 @@ def require_number(
 
     Raises
     ------
-    ParameterError
-        If the value is not a number in the range.
+    InputError
+        Of type `error_type`, if the value is not a number in the range.
 
     Examples
     --------
@@ -441,7 +450,7 @@ def require_number(
     if not is_number(value, kind) or not minimum <= value <= maximum:
         description = "a whole number" if whole else "a number"
         expected = f"{description} from {format_bound(minimum)} to {format_bound(maximum)} {unit}".rstrip()
-        raise ParameterError(_describe_mismatch(name, value, expected))
+        raise error_type(_describe_mismatch(name, value, expected))
     return float(value)
 
 

@@ -21,7 +21,7 @@ from robocov.environment.packing import (
     pack_lattice,
     pack_randomly,
 )
-from robocov.errors import StartError, format_count, format_position, is_number, quote
+from robocov.errors import StartError, format_count, format_position, is_number, quote, require_number
 from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray, Point
 
@@ -253,10 +253,8 @@ class Start:
 
     def _require_radius(self, radius: object) -> None:
         limits = TEAM_PARAMETERS["radius"]
-        if not is_number(radius) or not limits.minimum <= radius <= limits.maximum:
-            raise self._build_error(
-                f"radius: expected {limits.describe()} {limits.unit}, got {quote(radius)}"
-            )
+        name = f"start {self.name!r}: radius"
+        require_number(name, radius, limits.minimum, limits.maximum, limits.unit, error_type=StartError)
 
     def _describe_lack_of_space(self, n: int, radius: float) -> str:
         capacity = self.estimate_capacity(radius)

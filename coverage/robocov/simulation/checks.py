@@ -9,7 +9,15 @@ import shapely
 
 from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Environment
-from robocov.errors import ParameterError, format_bound, format_count, format_position, is_number, quote
+from robocov.errors import (
+    ParameterError,
+    format_bound,
+    format_count,
+    format_position,
+    is_number,
+    quote,
+    require_number,
+)
 from robocov.team import Team
 
 MIN_DT_S = 1e-4
@@ -31,8 +39,7 @@ def check_dt(dt: float) -> None:
     ParameterError
         If the period is not a number from `MIN_DT_S` to `MAX_DT_S`.
     """
-    if not is_number(dt) or not MIN_DT_S <= dt <= MAX_DT_S:
-        raise ParameterError(f"dt: expected a number from {MIN_DT_S:.4f} to {MAX_DT_S:g} s, got {quote(dt)}")
+    require_number("dt", dt, MIN_DT_S, MAX_DT_S, "s")
 
 
 def count_steps(duration: float, dt: float) -> int:

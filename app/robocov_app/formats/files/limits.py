@@ -1,6 +1,6 @@
 """Size limits of foreign files and of the maps in them."""
 
-from robocov.errors import MapError, format_bound, quote
+from robocov.errors import MapError, require_number
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 
 MAX_FILE_BYTES = 256_000_000
@@ -42,9 +42,7 @@ def require_length(
     value: float, source_name: str, minimum: float = 1e-6, maximum: float = MAX_SIZE_M
 ) -> None:
     """Raise MapError if a length, in m, is out of range."""
-    if not minimum <= value <= maximum:
-        expected = f"expected a number from {format_bound(minimum)} to {format_bound(maximum)} (m)"
-        raise MapError(f"{source_name}: {expected}, got {quote(value)}")
+    require_number(source_name, value, minimum, maximum, "(m)", error_type=MapError)
 
 
 def require_coordinate(value: float, source_name: str) -> None:
