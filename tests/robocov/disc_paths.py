@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import heapq
 import math
+import operator
 from collections import defaultdict
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
@@ -28,9 +29,8 @@ ARC_TOLERANCE = 1e-4
 """The same for arcs, relative to the radius. Chords stand for arcs."""
 ARC_STEP_RAD = 0.02
 """Maximum angle of a chord."""
-
-CROSSINGS_BASE = 1000
-"""More than twice the maximum number of crossings of a path with a ray."""
+Crossings: TypeAlias = tuple[int, ...]
+"""For each ray, how often a path crosses it upward minus how often it crosses it downward."""
 
 
 class DiscPath(NamedTuple):
@@ -48,7 +48,7 @@ class _Edge(NamedTuple):
     end: int
     length: float
     turning: float
-    crossings: int
+    crossings: Crossings
 
 
 class Rays:
@@ -64,12 +64,8 @@ class Rays:
         points = shapely.point_on_surface(shapely.polygons(holes)) if holes else np.empty(0, dtype=object)
         self.origins = shapely.get_coordinates(points)
 
-    def count_crossings(self, path: FloatArray) -> int:
-        """Count the crossings of a path, (w, 2) m, with each ray: 1 for each upward, -1 for each downward.
-
-        The numbers are combined into one, as the digits of a number with the base `CROSSINGS_BASE`. That of a
-        path is the sum of those of its pieces.
-        """
+    def count_crossings(self, path: FloatArray) -> Crossings:
+        """Count the crossings of a path, (w, 2) m, with each ray: 1 for each upward, -1 for each downward."""
         starts = path[:-1, None]
         ends = path[1:, None]
         is_upper_start = starts[..., 1] > self.origins[:, 1]
@@ -80,8 +76,7 @@ class Rays:
         x = starts[..., 0] + fractions * (ends[..., 0] - starts[..., 0])
         is_crossing &= x > self.origins[:, 0]
         signs = np.where(is_upper_end, 1, -1)
-        counts = (signs * is_crossing).sum(axis=0).tolist()
-        return sum(count * CROSSINGS_BASE**k for k, count in enumerate(counts))
+        return tuple((signs * is_crossing).sum(axis=0).tolist())
 
 
 def find_corners(free: MultiPolygon) -> FloatArray:
@@ -200,15 +195,18 @@ class DiscPaths:
         """Add a piece in both directions."""
         crossings = self._rays.count_crossings(points)
         self._edges[start].append(_Edge(end, length, turning, crossings))
-        self._edges[end].append(_Edge(start, length, turning, -crossings))
+        backward_crossings = tuple(-count for count in crossings)
+        self._edges[end].append(_Edge(start, length, turning, backward_crossings))
 
-    def find_shortest(self, crossings: int | None = None, max_length: float = np.inf) -> DiscPath | None:
+    def find_shortest(
+        self, crossings: Crossings | None = None, max_length: float = np.inf
+    ) -> DiscPath | None:
         """Find the shortest path.
 
         Parameters
         ----------
-        crossings : int, optional
-            Crossings of the path with the rays, so that it passes all obstacles on given sides. By default,
+        crossings : tuple of int, optional
+            Crossings of the path with each ray, so that it passes all obstacles on given sides. By default,
             all paths are compared.
         max_length : float, m
             Length above which the search ends.
@@ -220,13 +218,14 @@ class DiscPaths:
         """
         # Each entry has a lower bound on the length of a path to the target, the length and turning of its
         # first part, the node at the end of this part, and the crossings.
-        queue = [(0.0, 0.0, 0.0, node, 0) for node in self._source_nodes]
+        no_crossings = (0,) * len(self._rays.origins)
+        queue = [(0.0, 0.0, 0.0, node, no_crossings) for node in self._source_nodes]
         visited = set()
         while queue:
             bound, length, turning, node, crossed = heapq.heappop(queue)
             if bound > max_length:
                 return None
-            state = (node, 0 if crossings is None else crossed)
+            state = (node, None if crossings is None else crossed)
             if state in visited:
                 continue
             visited.add(state)
@@ -236,6 +235,6 @@ class DiscPaths:
                 next_length = length + edge.length
                 next_bound = next_length + math.dist(self._nodes[edge.end], self._target)
                 next_turning = turning + edge.turning
-                next_crossed = crossed + edge.crossings
+                next_crossed = tuple(map(operator.add, crossed, edge.crossings))
                 heapq.heappush(queue, (next_bound, next_length, next_turning, edge.end, next_crossed))
         return None
