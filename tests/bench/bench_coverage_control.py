@@ -62,7 +62,8 @@ OUR_CONTROLLERS = {
     "adaptive": "the density where robots have been, and estimates of others",
 }
 """Controllers of robocov that run by default, with what a robot knows."""
-CLAIRVOYANT_LLOYD = "the density and all positions"
+CLAIRVOYANT_LLOYD_LABEL = "`lloyd` with unlimited communication"
+CLAIRVOYANT_LLOYD_KNOWLEDGE = "the density and all positions"
 """What a robot of Lloyd's algorithm knows with unlimited communication."""
 HEAD = "| controller | what a robot knows | remaining cost | in each world |\n|---|---|---|---|"
 
@@ -219,11 +220,21 @@ def format_table(rows: Sequence[Row]) -> str:
     return "\n".join([HEAD, *(format_row(row) for row in sorted(rows, key=lambda row: row.mean))])
 
 
+def format_our_label(name: str) -> str:
+    """Return the label of a controller of robocov."""
+    return f"`{name}`"
+
+
+def format_their_label(name: str) -> str:
+    """Return the label of a controller of CoverageControl."""
+    return f"{name} (CoverageControl)"
+
+
 def list_labels() -> dict[str, str]:
     """Return what a robot knows, by the label of each row of the table with the default options."""
-    labels = {f"{name} (CoverageControl)": knowledge for name, knowledge in THEIR_CONTROLLERS.items()}
-    labels["`lloyd` with unlimited communication"] = CLAIRVOYANT_LLOYD
-    return labels | {f"`{name}`": knowledge for name, knowledge in OUR_CONTROLLERS.items()}
+    labels = {format_their_label(name): knowledge for name, knowledge in THEIR_CONTROLLERS.items()}
+    labels[CLAIRVOYANT_LLOYD_LABEL] = CLAIRVOYANT_LLOYD_KNOWLEDGE
+    return labels | {format_our_label(name): knowledge for name, knowledge in OUR_CONTROLLERS.items()}
 
 
 def main() -> None:
@@ -239,12 +250,12 @@ def main() -> None:
     runs: dict[str, Callable[[int], float]] = {}
     if not arguments.ours:
         for name in THEIR_CONTROLLERS:
-            runs[f"{name} (CoverageControl)"] = partial(run_theirs, name, duration=arguments.duration)
-    runs["`lloyd` with unlimited communication"] = partial(
+            runs[format_their_label(name)] = partial(run_theirs, name, duration=arguments.duration)
+    runs[CLAIRVOYANT_LLOYD_LABEL] = partial(
         run_ours, "lloyd", duration=arguments.duration, communication_range=math.inf
     )
     for name in arguments.controllers:
-        runs[f"`{name}`"] = partial(limited, name)
+        runs[format_our_label(name)] = partial(limited, name)
     knowledge = list_labels()
     rows = []
     with ProcessPoolExecutor(arguments.workers) as pool:
