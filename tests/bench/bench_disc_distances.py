@@ -54,8 +54,10 @@ def build_sites(area: shapely.Geometry, lattice: int) -> FloatArray:
     return points[shapely.intersects_xy(area, *points.T)]
 
 
-def compute_error(environment: Environment, positions: FloatArray, radius: float, lattice: int) -> float:
-    """Return the difference of the mean distances of discs and of points, relative to that of points."""
+def compute_relative_excess(
+    environment: Environment, positions: FloatArray, radius: float, lattice: int
+) -> float:
+    """Return by which fraction the mean distance of discs is longer than that of points."""
     eroded = environment.free.buffer(-radius, quad_segs=EDGES_PER_QUARTER)
     sites = build_sites(eroded.buffer(-MIN_CLEARANCE_M), lattice)
     # The reference placement may contain positions that are closer to a wall than the radius.
@@ -81,7 +83,7 @@ def get_reference_positions(frozen_map: Mapping[str, Any], robots: int) -> Float
 
 
 def main() -> None:
-    """Print the error on each map of a track, and the largest one."""
+    """Print the relative excess of the mean distance on each map of a track, and the largest one."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -93,12 +95,13 @@ def main() -> None:
     )
     arguments = parser.parse_args()
     frozen_maps = load_frozen_maps()
-    errors = []
+    excesses = []
     for name in TRACKS[arguments.track].maps:
         positions = get_reference_positions(frozen_maps[name], arguments.robots)
-        errors.append(compute_error(load_suite_map(name), positions, arguments.radius, arguments.lattice))
-        print(f"{name:24} {errors[-1]:7.2%}", flush=True)
-    print(f"{len(errors)} maps: median {np.median(errors):.2%}, largest {max(errors):.2%}")
+        environment = load_suite_map(name)
+        excesses.append(compute_relative_excess(environment, positions, arguments.radius, arguments.lattice))
+        print(f"{name:24} {excesses[-1]:7.2%}", flush=True)
+    print(f"{len(excesses)} maps: median {np.median(excesses):.2%}, largest {max(excesses):.2%}")
     print(f"CPU time {time.process_time():.0f} s")
 
 
