@@ -6,7 +6,7 @@ import csv
 import math
 import re
 import runpy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from robocov.controllers import CONTROLLERS
+from robocov.typing import FloatArray
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.page.anomalies import find_anomalies
 from robocov_app.benchmark.ratings import Rating, build_ratings, get_run_key
@@ -42,14 +43,25 @@ def read_text(page: Path) -> str:
 
 
 @cache
+def read_entry(controller: str) -> dict[str, Any]:
+    """Return the entry of a controller."""
+    return read_result(ENTRIES / f"{controller}.json.gz")
+
+
+@cache
 def read_rows(controller: str, track: str) -> Sequence[dict[str, Any]]:
     """Return the rows of a controller on a track."""
-    return [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
+    return [row for row in read_entry(controller)["rows"] if row["track"] == track]
 
 
 def rate(controller: str, track: str) -> Rating:
     """Return the rating of a controller on a track."""
     return Rating(controller, track, read_rows(controller, track))
+
+
+def compute_median_gap(controller: str, track: str) -> float:
+    """Return the median gap of a controller on a track, %."""
+    return 100.0 * rate(controller, track).gap.estimate
 
 
 def compute_map_medians(controller: str, track: str, metric: str = "gap") -> dict[str, float]:
@@ -69,16 +81,16 @@ def count_above(controller: str, other: str, track: str) -> int:
 
 def format_row(controller: str, track: str) -> str:
     """Return the row of a controller's results on a track."""
-    rows = [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
+    rows = read_rows(controller, track)
     assert not any("error" in row for row in rows)
-    rating = Rating(controller, track, rows)
+    rating = rate(controller, track)
     medians = {}
     for name in suite.TRACKS[track].maps:
         gaps = [row["gap"] for row in rows if row["map"] == name and row["gap"] is not None]
         medians[name] = np.median(gaps)
     maps_above = sum(median > 0.05 for median in medians.values())
     runs_with_contacts = sum(row["contacts"] > 0 for row in rows)
-    gap = 100.0 * rating.gap.estimate
+    gap = compute_median_gap(controller, track)
     path_length = rating.compute_median("path_length_m")
     settled = 100.0 * rating.compute_rest()[0]
     cells = [
@@ -140,7 +152,7 @@ def test_the_best_controller_with_own_information_on_large_plans_agrees_with_the
         for result in load_bundled_results()
         if result["entry"]["information"] == "own"
     }
-    text = " ".join(PAGE.read_text(encoding="utf-8").split())
+    text = read_text(PAGE)
     gaps_of_atlas = []
     for track in PLAN_TRACKS:
         gaps = {
@@ -195,8 +207,7 @@ def test_the_table_of_sources_agrees_with_the_docstrings() -> None:
 
 
 def test_values_of_rapf_with_one_robot_agree_with_the_entry() -> None:
-    rows = [row for row in read_result(ENTRIES / "rapf.json.gz")["rows"] if row["track"] == "one-robot"]
-    rating = Rating("rapf", "one-robot", rows)
+    rating = rate("rapf", "one-robot")
     values = f"{rating.gap.estimate:.1%}, {rating.compute_median('path_length_m'):.1f} m"
     assert f"(`rapf`: {values})" in PAGE.read_text(encoding="utf-8")
 
@@ -339,7 +350,8 @@ def test_unfinished_runs_of_frontier_median_agree_with_the_entries() -> None:
         f"{one} of {one_total} runs have not settled after 60 s ({one_gap:.1%}), "
         f"and on Plans small {small} of {small_total} after 240 s ({small_gap:.1%})"
     ) in text
-    result, rapf = (read_result(ENTRIES / f"{name}.json.gz") for name in ("frontier-median", "rapf"))
+    result = read_entry("frontier-median")
+    rapf = read_entry("rapf")
     core_rows = [row for row in result["rows"] if row["track"] in suite.RANKED_TRACKS["core"]]
     large_gaps = [row for row in core_rows if row["gap"] > 0.2]
     unsettled_count = sum(row["settled_at_s"] is None for row in large_gaps)
@@ -439,18 +451,16 @@ def test_the_effect_of_the_factors_of_the_score_agrees_with_the_entries(
         for rank, k in enumerate(np.argsort(-scores), start=1):
             ranks[names[k]].append(rank)
     assert set(ranks["atlas-shared"]) == {1}
-    text = " ".join((PAGE.parent / "benchmark.md").read_text(encoding="utf-8").split())
+    text = read_text(BENCHMARK_PAGE)
     best, worst = min(ranks["atlas"]), max(ranks["atlas"])
     assert f"always `atlas-shared`, but the rank of `atlas` among them varies from {best} to {worst}" in text
     best, worst = min(ranks["learned"]), max(ranks["learned"])
     assert f"that of `learned`, whose robots never settle, from {best} to {worst}" in text
-    oracle_rows = read_result(ENTRIES / "oracle.json.gz")["rows"]
     contacts = {
-        track: sum(row["contacts"] > 0 for row in oracle_rows if row["track"] == track)
-        for track in ("lossy", "noisy")
+        track: sum(row["contacts"] > 0 for row in read_rows("oracle", track)) for track in ("lossy", "noisy")
     }
     assert f"in {contacts['lossy']} of 30 runs on Lossy and in {contacts['noisy']} on Noisy" in text
-    core_rows = [row for row in oracle_rows if row["track"] in core]
+    core_rows = [row for track in core for row in read_rows("oracle", track)]
     best_count = sum(row["gap"] <= 0.002 for row in core_rows)
     assert f"in {best_count} of {len(core_rows)} runs (gap of at most 0.2%)" in text
 
@@ -471,8 +481,7 @@ CONTROLLERS_OF_TUNNELS = ("atlas", "atlas-shared", "voronoi-graph", "geodesic-ll
 
 def format_gap_and_path_length(controller: str, track: str, map_name: str) -> tuple[str, str]:
     """Return the median gap and path length of a controller on a map."""
-    rows = read_result(ENTRIES / f"{controller}.json.gz")["rows"]
-    selected = [row for row in rows if (row["track"], row["map"]) == (track, map_name)]
+    selected = [row for row in read_rows(controller, track) if row["map"] == map_name]
     gap = 100.0 * np.median([row["gap"] for row in selected])
     path_length = np.median([row["path_length_m"] for row in selected])
     return f"{gap:.1f}%", f"{path_length:.1f} m"
@@ -490,15 +499,14 @@ def test_failures_agree_with_the_entries(track: str, map_name: str) -> None:
 
 def read_ideal_rows(controller: str) -> dict[tuple[str, int], dict[str, Any]]:
     """Return the rows of a controller on the track Ideal, by map and seed."""
-    rows = read_result(ENTRIES / f"{controller}.json.gz")["rows"]
-    return {get_run_key(row): row for row in rows if row["track"] == "ideal"}
+    return {get_run_key(row): row for row in read_rows(controller, "ideal")}
 
 
 def test_unsettled_runs_of_atlas_agree_with_the_entries() -> None:
     families = ("blocks", "offices", "plants")
     rows = [row for row in read_ideal_rows("atlas").values() if suite.FAMILY_OF[row["map"]] in families]
     count = sum(row["settled_at_s"] is None for row in rows)
-    text = " ".join(FAILURES_PAGE.read_text(encoding="utf-8").split())
+    text = read_text(FAILURES_PAGE)
     assert f"{count} of {len(rows)} runs in the families blocks, offices and plants have not settled" in text
 
 
@@ -508,22 +516,14 @@ def test_paths_of_greedy_submodular_agree_with_the_entries() -> None:
     for key, row in read_ideal_rows("greedy-submodular").items():
         is_shorter = row["path_length_m"] < shared[key]["path_length_m"]
         count += is_shorter and row["mean_distance_m"] <= 1.01 * shared[key]["mean_distance_m"]
-    text = " ".join(FAILURES_PAGE.read_text(encoding="utf-8").split())
+    text = read_text(FAILURES_PAGE)
     expected = f"In {count} of {len(shared)} runs on the track Ideal, `greedy-submodular` has a shorter path"
     assert expected in text
 
 
 def test_path_lengths_of_atlas_agree_with_the_entries() -> None:
-    atlas, rapf = (
-        Rating(
-            name,
-            "ideal",
-            [row for row in read_result(ENTRIES / f"{name}.json.gz")["rows"] if row["track"] == "ideal"],
-        )
-        for name in ("atlas", "rapf")
-    )
     text = FAILURES_PAGE.read_text(encoding="utf-8")
-    lengths = [rating.compute_median("path_length_m") for rating in (atlas, rapf)]
+    lengths = [rate(name, "ideal").compute_median("path_length_m") for name in ("atlas", "rapf")]
     assert f"on the track Ideal is {lengths[0]:.1f} m, and {lengths[1]:.1f} m with `rapf`" in text
 
 
@@ -612,11 +612,14 @@ def select_comparable_rows(
     return [earlier for earlier, _ in pairs], [current for _, current in pairs], changed_maps
 
 
-def format_changes(*rows_before_and_after: Sequence[dict[str, Any]]) -> tuple[list[str], str]:
-    """Return the changes of the median, mean and worst gap, and of the number of runs above 5%."""
-    before, after = (np.array([float(row["gap"]) for row in rows]) for rows in rows_before_and_after)
-    cells = [f"{measure(before):.1%} → {measure(after):.1%}" for measure in (np.median, np.mean, np.max)]
-    return cells, f"{(before > 0.05).sum()} → {(after > 0.05).sum()}"
+def list_values(rows: Sequence[Mapping[str, Any]], metric: str) -> FloatArray:
+    """Return a metric of rows, which may be texts."""
+    return np.array([float(row[metric]) for row in rows])
+
+
+def format_gap_changes(before: FloatArray, after: FloatArray) -> list[str]:
+    """Return the changes of the median, mean and worst gap."""
+    return [f"{measure(before):.1%} → {measure(after):.1%}" for measure in (np.median, np.mean, np.max)]
 
 
 @pytest.mark.parametrize(
@@ -624,11 +627,13 @@ def format_changes(*rows_before_and_after: Sequence[dict[str, Any]]) -> tuple[li
 )
 def test_changes_by_messages_agree_with_the_entries(controller: str) -> None:
     before, after, changed_maps = select_comparable_rows("messages", controller, "lossy")
-    cells, counts = format_changes(before, after)
-    assert f"| `{controller}` | {' | '.join(cells)} | {counts} |\n" in BENCHMARK_PAGE.read_text(
-        encoding="utf-8"
-    )
-    assert np.mean([row["gap"] for row in after]) > np.mean([float(row["gap"]) for row in before])
+    gaps_before = list_values(before, "gap")
+    gaps_after = list_values(after, "gap")
+    cells = format_gap_changes(gaps_before, gaps_after)
+    counts = f"{(gaps_before > 0.05).sum()} → {(gaps_after > 0.05).sum()}"
+    row = f"| `{controller}` | {' | '.join(cells)} | {counts} |"
+    assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
+    assert gaps_after.mean() > gaps_before.mean()
     text = read_text(BENCHMARK_PAGE)
     assert f"on {len(before)} of the {len(before) + len(changed_maps)} maps" in text
     assert f"On the other two, {' and '.join(sorted(changed_maps))}, narrow passages were closed" in text
@@ -640,24 +645,19 @@ def test_changes_by_the_gain_stake_agree_with_the_entries(track: str, controller
     before, after, changed_maps = select_comparable_rows("stake", controller, track)
     assert not changed_maps
     assert len(before) == len(read_rows(controller, track))
-    cells, _ = format_changes(before, after)
-    first, last = (np.median([float(row["path_length_m"]) for row in rows]) for rows in (before, after))
-    path = f"{first:.1f} → {last:.1f} m"
+    cells = format_gap_changes(list_values(before, "gap"), list_values(after, "gap"))
+    path_before = np.median(list_values(before, "path_length_m"))
+    path_after = np.median(list_values(after, "path_length_m"))
+    path = f"{path_before:.1f} → {path_after:.1f} m"
     row = f"| {suite.format_heading(track)} | `{controller}` | {' | '.join(cells)} | {path} |"
     assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
 
 
-def compute_median_gap(controller: str, track: str) -> float:
-    """Return the median gap of a controller on a track, %."""
-    rows = [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
-    return 100.0 * Rating(controller, track, rows).gap.estimate
-
-
 def test_results_of_the_trained_policy_agree_with_the_entries() -> None:
-    text = " ".join((PAGE.parent / "learning.md").read_text(encoding="utf-8").split())
-    rows = [row for row in read_result(ENTRIES / "learned.json.gz")["rows"] if row["track"] == "ideal"]
-    rating = Rating("learned", "ideal", rows)
-    assert f"the median gap of `learned` is {100.0 * rating.gap.estimate:.1f}%" in text
+    text = read_text(PAGE.parent / "learning.md")
+    rows = read_rows("learned", "ideal")
+    rating = rate("learned", "ideal")
+    assert f"the median gap of `learned` is {compute_median_gap('learned', 'ideal'):.1f}%" in text
     assert sum(row["contacts"] for row in rows) == 0
     assert rating.compute_rest()[0] == 0.0
     assert f"the median path length is {rating.compute_median('path_length_m'):.1f} m" in text
