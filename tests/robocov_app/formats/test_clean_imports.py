@@ -1,6 +1,7 @@
 """Properties of every import: clean rings, no pockets, accurate walls, one rule for boundaries."""
 
 import math
+from itertools import pairwise, permutations
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from fuzz_structures import STRUCTURES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
-from shapely import MultiPolygon, box
+from shapely import LineString, MultiPolygon, Point, box
 
 from robocov.environment import MAX_SAGITTA_M, Environment
 from robocov.errors import RobocovError
@@ -23,7 +24,7 @@ from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion.cleaning import remove_hairs
 from robocov_app.formats.geometry.conversion.deviation import measure_deviation
 from robocov_app.formats.geometry.polygons import round_polygons, tidy_ring
-from robocov_app.formats.geometry.shapes.snapping import close_gaps, compute_default_snap
+from robocov_app.formats.geometry.shapes.snapping import close_gaps, compute_default_snap, join_line_ends
 
 GRID = 1e-4
 MADE = sorted(STRUCTURES.keys() & IMPORTERS.keys())
@@ -206,6 +207,38 @@ def test_rooms_of_a_grid_with_gaps_are_joined() -> None:
 def test_the_snapping_tolerance_follows_the_size() -> None:
     assert compute_default_snap([box(0, 0, 30, 10)]) == 0.01
     assert compute_default_snap([box(0, 0, 1, 0.5)]) == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_three_line_ends_in_a_chain_move_to_one_point(order: tuple[int, ...], is_reversed: bool) -> None:
+    sides = [
+        LineString([(0.0, 0.0), (10.0, 0.0)]),
+        LineString([(10.0, 0.008), (10.0, 5.0), (0.0, 0.0)]),
+        # Within the tolerance of the second side, but not of the first one.
+        LineString([(10.0, 0.016), (15.0, 5.0)]),
+    ]
+    lines = [sides[k].reverse() if is_reversed else sides[k] for k in order]
+    joined = join_line_ends(lines, 0.01)
+    corner = Point(10.0, 0.0)
+    corners = {point for line in joined for point in line.coords if Point(point).distance(corner) < 0.1}
+    assert len(corners) == 1
+    (area,) = shapely.polygonize(joined).geoms
+    assert area.area == pytest.approx(25.0, abs=0.1)
+
+
+@pytest.mark.parametrize("sides", [40, 1000])
+def test_curves_of_short_lines_keep_their_shape(sides: int) -> None:
+    circle = Point(0.0, 0.0).buffer(1.0, quad_segs=sides // 4)
+    points = list(circle.exterior.coords)
+    lines = [LineString(pair) for pair in pairwise(points)]
+    # The last line ends next to the start of the curve, and another line next to one of its vertices.
+    lines[-1] = LineString([points[-2], (1.0, 0.005)])
+    lines.append(LineString([(-1.008, 0.0), (-3.0, 0.0)]))
+    joined = join_line_ends(lines, 0.01)
+    (area,) = shapely.polygonize(shapely.get_parts(shapely.union_all(joined))).geoms
+    assert area.hausdorff_distance(circle) < 0.03
+    assert area.touches(joined[-1])
 
 
 def test_hairs_are_removed_and_counted(tmp_path: Path) -> None:

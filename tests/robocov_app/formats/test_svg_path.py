@@ -141,6 +141,7 @@ def test_arcs_without_extent_are_omitted_and_tiny_radii_are_lines() -> None:
         ("matrix(1 2 3 4 5 6)", (1, 1), (9, 12)),
         ("translate(10)scale(2) , rotate(90)", (1, 0), (10, 2)),
         ("translate(3px, 4px) rotate(90deg)", (1, 0), (3, 5)),
+        ("translate(3PX, 4Px) rotate(90DEG)", (1, 0), (3, 5)),
         ("none", (1, 2), (1, 2)),
         ("", (1, 2), (1, 2)),
     ],

@@ -65,6 +65,16 @@ def test_several_geometries_are_read(tmp_path: Path, separator: str) -> None:
 def test_empty_points_are_omitted(tmp_path: Path) -> None:
     foreign = read(tmp_path, "wkt", f"{HALL} MULTIPOINT(EMPTY, EMPTY)", pillar=0.2)
     assert foreign.free.area == pytest.approx(49.0)
+    assert foreign.notes == ()
+
+
+@pytest.mark.parametrize(
+    "points",
+    ["1 1, EMPTY, 3 3", "EMPTY, 1 1, 3 3", "1 1, (3 3), EMPTY", "(1 1), EMPTY, 3 3", "1 1 , 3 3,EMPTY"],
+)
+def test_points_with_and_without_brackets_may_be_mixed_with_empty_ones(tmp_path: Path, points: str) -> None:
+    foreign = read(tmp_path, "wkt", f"{HALL} MULTIPOINT({points})", pillar=0.2)
+    assert foreign.notes == ("2 points treated as pillars",)
 
 
 @pytest.mark.parametrize(
@@ -193,8 +203,8 @@ def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
         ("POLYGON((0 0, 10 0, 10 inf, 0 1))", ":1:21: expected a point"),
         ("POLYGON((0 0, 10 0, 10, 0 1))", ":1:21: expected a point"),
         ("POLYGON((0 0, 10 0 3, 10 5, 0 1))", ":1:15: expected a point such as 1.5 2, with as many"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1e999))", ":1:9: expected finite numbers"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1e308))", ":1:9: expected finite numbers"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1e999))", ":1:10: expected finite numbers"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1e308))", ":1:10: expected finite numbers"),
         ("POLYGON((0 0, 10 0, 10 5, 0 1e99))", ": geometry 1: expected coordinates"),
         ("POLYGON((0 0, 10 0, 10 5, 0 1..5))", "expected a point"),
         ("POLYGON((0 0, 10 0, 10 5, 0 1", ":1:30: expected a point or ), got the end"),
@@ -202,6 +212,9 @@ def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
         ("POLYGON(0 0, 10 0, 10 5, 0 1)", ":1:9: expected (, got '0 0, 10 0, 10 5, 0 1)'"),
         ("POLYGON", ":1:8: expected (, got the end"),
         ("POINT(1 1, 2 2)", ":1:1: expected one point, got 2"),
+        ("MULTIPOINT(1 1, EMPTY, 2)", ":1:24: expected a point such as 1.5 2"),
+        ("MULTIPOINT(1 1, EMPTY, x)", ":1:24: expected a point such as 1.5 2"),
+        ("MULTIPOINT(1 1, EMPTY, 2 1e999)", ":1:24: expected finite numbers"),
         ("LINESTRING(1 1)", ":1:11: expected at least 2 points, got 1"),
         ("CURVEPOLYGON((0 0, 1 0, 1 1, 0 0))", ":1:1: expected a geometry with straight edges"),
         ("GEOMETRYCOLLECTION(" * 40, "nested too deeply, expected at most 32 levels"),

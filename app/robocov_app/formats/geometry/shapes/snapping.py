@@ -16,13 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from shapely import LineString, MultiPolygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import GRID_M
 from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
-from robocov.typing import FloatArray
+from robocov.typing import FloatArray, IntArray
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 DEFAULT_SNAP_M = 0.01
@@ -132,16 +134,18 @@ def are_edge_to_edge(first: BaseGeometry, second: BaseGeometry, tolerance: float
 
 
 def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineString]:
-    """Move the ends of lines that are within a tolerance, m, of each other to the same point."""
+    """Move the ends of lines that are within a tolerance, m, of each other to the same point.
+
+    A chain of such ends moves to the same point, too. Ends that already coincide with others are joints,
+    which may be the vertices of a curve that consists of many short lines. Joints move by at most the
+    tolerance, and no chain leads from joint to joint, so that the curve keeps its shape.
+    """
     if not lines:
         return []
+    # The starts of all lines come before their ends.
     ends = [shapely.get_point(lines, 0), shapely.get_point(lines, -1)]
     points = np.concatenate(ends)
-    index, neighbor = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
-    # Each end moves to the close end with the lowest index. The starts of all lines come before their ends.
-    first = np.full(len(points), len(points))
-    np.minimum.at(first, index, neighbor)
-    joined = shapely.get_coordinates(points[first])
+    joined = shapely.get_coordinates(points[_choose_common_ends(points, tolerance)])
     result = []
     for k, line in enumerate(lines):
         vertices = shapely.get_coordinates(line)
@@ -149,6 +153,32 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
         vertices[-1] = joined[len(lines) + k]
         result.append(LineString(vertices))
     return result
+
+
+def _choose_common_ends(points: FloatArray, tolerance: float) -> IntArray:
+    """Return the index of the end to which each of n ends moves, (n,)."""
+    count = len(points)
+    first, second = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
+    is_same_point = (shapely.distance(points[first], points[second]) == 0.0) & (first != second)
+    is_joint = np.zeros(count, dtype=bool)
+    is_joint[first[is_same_point]] = True
+    # A joint moves to the close joint with the lowest index.
+    chosen = np.arange(count)
+    is_joint_pair = is_joint[first] & is_joint[second]
+    np.minimum.at(chosen, first[is_joint_pair], second[is_joint_pair])
+    # The other ends form chains. A chain moves to its end with the lowest index or, if it is close to a
+    # joint, with the joint.
+    is_link = ~is_joint[first] & ~is_joint[second]
+    link_ends = (first[is_link], second[is_link])
+    links = coo_array((np.ones(is_link.sum()), link_ends), shape=(count, count))
+    _, chain_of_end = connected_components(links, directed=False)
+    first_ends = np.full(count, count)
+    np.minimum.at(first_ends, chain_of_end, chosen)
+    joints = np.full(count, count)
+    is_near_joint = ~is_joint[first] & is_joint[second]
+    np.minimum.at(joints, chain_of_end[first[is_near_joint]], chosen[second[is_near_joint]])
+    target_of_chain = np.where(joints < count, joints, first_ends)
+    return np.asarray(target_of_chain[chain_of_end])
 
 
 def _are_close(outlines: FloatArray, snap: float) -> bool:

@@ -11,7 +11,7 @@ from robocov_app.formats.geometry.frames import build_frame
 from robocov_app.formats.vector.svg.numbers import MAX_NUMBER, parse_numbers
 
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
-_UNIT = re.compile(r"(?<=[\d.])(?:px|deg)\b")
+_UNIT = re.compile(r"(?<=[\d.])(?:px|deg)\b", re.IGNORECASE)
 _ALIGNMENTS = {"xmin": 0.0, "xmid": 0.5, "xmax": 1.0, "ymin": 0.0, "ymid": 0.5, "ymax": 1.0}
 
 

@@ -36,6 +36,7 @@ _SRID = re.compile(r"SRID\s*=\s*(\d{1,9})\s*;", re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z_]+")
 _KIND = re.compile(rf"((?ai:{'|'.join(KINDS)}))\s*((?ai:ZM|Z|M))?(?![A-Za-z_])")
 _POINTS = re.compile(r"\(([-+.\deE\s,]*)\)", re.ASCII)
+_BARE_POINT = re.compile(r"[-+.\deE\s]*", re.ASCII)
 _NOT_IN_POINT = re.compile(r"[^-+.\deE\s,]", re.ASCII)
 _MAX_NUMBER = 1e100
 """Larger numbers might overflow before the limits of a map are checked."""
@@ -215,12 +216,17 @@ class WktParser:
         self._add_points(points, geometry)
 
     def _parse_multipoint(self, geometry: _Geometry) -> None:
-        """Parse points in a common pair of brackets, or in a pair of brackets each."""
-        if self._scanner.match(_POINTS):
+        """Parse points in a common pair of brackets, or in a pair of brackets each; some may be EMPTY."""
+        scanner = self._scanner
+        if scanner.match(_POINTS):
             self._add_points(self._parse_points(geometry, minimum=1), geometry)
             return
         for _ in self._iterate_items():
-            self._add_points(self._parse_points(geometry, minimum=1), geometry)
+            if scanner.text.startswith("(", scanner.position):
+                points = self._parse_points(geometry, minimum=1)
+            else:
+                points = self._parse_bare_point(geometry)
+            self._add_points(points, geometry)
 
     def _add_points(self, points: FloatArray, geometry: _Geometry) -> None:
         self._geometries += [
@@ -235,8 +241,26 @@ class WktParser:
         if match is None:
             self._raise_points_error()
         scanner.position = match.start(1)
+        points = self._convert_points(match[1], geometry)
+        if len(points) < minimum:
+            scanner.raise_error(f"expected at least {minimum} points, got 1", match.start())
+        scanner.position = match.end()
+        return points
+
+    def _parse_bare_point(self, geometry: _Geometry) -> FloatArray:
+        """Parse a point without brackets; return its first two coordinates, (1, 2)."""
+        match = self._scanner.match(_BARE_POINT)
+        assert match is not None  # the pattern also matches empty text
+        points = self._convert_points(match[0], geometry)
+        self._scanner.position = match.end()
+        return points
+
+    def _convert_points(self, list_text: str, geometry: _Geometry) -> FloatArray:
+        """Convert a list of points at the current position; return their first two coordinates, (k, 2)."""
+        scanner = self._scanner
+        start = scanner.position
         rows: list[list[float]] = []
-        for text in match[1].split(","):
+        for text in list_text.split(","):
             try:
                 rows.append([float(number) for number in text.split()])
             except ValueError:
@@ -244,12 +268,9 @@ class WktParser:
             if not 2 <= len(rows[-1]) <= 4 or len(rows[-1]) != len(rows[0]):
                 self._raise_point_error()
             scanner.position += len(text) + 1
-        if len(rows) < minimum:
-            scanner.raise_error(f"expected at least {minimum} points, got 1", match.start())
-        scanner.position = match.end()
         points = np.array(rows)
         if not (np.abs(points) < _MAX_NUMBER).all():
-            scanner.raise_error("expected finite numbers", match.start())
+            scanner.raise_error("expected finite numbers", start)
         dimensions = points.shape[1]
         has_heights = dimensions > 2 and not (geometry.is_measured and dimensions == 3)
         if has_heights:
