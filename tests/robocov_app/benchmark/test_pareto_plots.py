@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -28,11 +29,23 @@ LABELED_POINTS = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abc
 def test_labels_of_a_few_points_do_not_overlap(given_points: list[tuple[float, float, str]]) -> None:
     marks = np.array([(x, y) for x, y, _ in given_points])
     labels = [label for _, _, label in given_points]
-    centers = place_labels(marks, labels, (0.0, 0.0, 600.0, 360.0))
+    centers = place_labels(marks, labels, (0.0, 0.0, 600.0, 360.0), np.empty((0, 2)))
     half_sizes = np.array([(3.0 * len(label), 6.5) for label in labels])
     for k, j in combinations(range(len(labels)), 2):
         gaps = np.abs(centers[k] - centers[j]) - half_sizes[k] - half_sizes[j]
         assert gaps.max() > -1e-6
+
+
+@pytest.mark.parametrize("line", [[(100, 180), (500, 180)], [(300, 80), (300, 180), (500, 280)]])
+def test_labels_do_not_cross_a_line_through_their_marks(line: list[tuple[int, int]]) -> None:
+    marks = np.array([(300.0, 180.0), (400.0, 230.0)])
+    labels = ["Atlas", "Greedy submodular"]
+    centers = place_labels(marks, labels, (0.0, 0.0, 600.0, 360.0), np.array(line, dtype=float))
+    for mark, center, label in zip(marks, centers, labels, strict=True):
+        half_size = np.array((3.0 * len(label), 6.5))
+        box = shapely.box(*(center - half_size + 2.0), *(center + half_size - 2.0))
+        assert not box.intersects(shapely.LineString(line))
+        assert box.distance(shapely.Point(mark)) < 30.0
 
 
 def test_labels_are_next_to_the_marks_of_a_figure() -> None:

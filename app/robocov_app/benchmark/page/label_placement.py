@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from robocov.arrays import compute_lengths
 from robocov.typing import FloatArray, IntArray
 
 Frame: TypeAlias = tuple[float, float, float, float]
@@ -21,14 +22,20 @@ _HEIGHT_COST = 0.1
 """Cost per pixel of height above or below the mark, so that labels level with their marks win."""
 _OVERLAP_COST = 10.0
 """Cost per square pixel that a label shares with marks or other labels, in pixels of distance."""
+_LINE_COST = 3.0
+"""Cost per pixel of the line that a label covers, in pixels of distance."""
+_LINE_STEP_PX = 2.0
+"""Distance between the points that represent the line."""
 _OUTSIDE_COST = 1000.0
 """Cost per square pixel of a label outside the frame, which would be cut off or cover the axes."""
 _MAX_ROUNDS = 6
 """Maximum number of passes over all labels."""
 
 
-def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame) -> FloatArray:
-    """Place labels close to their marks such that, if possible, they hide no marks and no other labels.
+def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame, line: FloatArray) -> FloatArray:
+    """Place labels close to their marks.
+
+    If possible, they hide no marks and no other labels, and do not cross a given line.
 
     Parameters
     ----------
@@ -38,6 +45,8 @@ def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame) -> Floa
         Texts of the labels.
     frame : Frame
         Area in which the labels must be.
+    line : (k, 2) array, px
+        Vertices of the line that labels should not cross; may be empty.
 
     Returns
     -------
@@ -46,12 +55,14 @@ def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame) -> Floa
     """
     half_sizes = compute_half_sizes(labels)
     mark_boxes = np.hstack([marks - MARK_HALF_SIZE_PX, marks + MARK_HALF_SIZE_PX])
+    line_points = _sample_line(line)
     candidates = []
     costs = []
     for mark, half_size in zip(marks, half_sizes, strict=True):
         centers = mark + _list_offsets(half_size)
         candidates.append(np.hstack([centers - half_size, centers + half_size]))
-        costs.append(_compute_costs(mark, centers, half_size, mark_boxes, frame))
+        line_costs = _LINE_COST * _LINE_STEP_PX * _count_points(candidates[-1], line_points)
+        costs.append(_compute_costs(mark, centers, half_size, mark_boxes, frame) + line_costs)
     # From top to bottom, so that few lines to labels cross.
     order = np.argsort(-marks[:, 1], kind="stable")
     chosen = _choose_candidates(candidates, costs, order)
@@ -129,6 +140,23 @@ def _list_offsets(half_size: FloatArray) -> FloatArray:
         if abs(row) > 1.0:
             offsets.append((0.0, height))
     return np.array(offsets)
+
+
+def _sample_line(line: FloatArray) -> FloatArray:
+    """Return points along a line, one in each step of `_LINE_STEP_PX`, (p, 2) px."""
+    if len(line) < 2:
+        return np.empty((0, 2))
+    lengths = np.concatenate([[0.0], np.cumsum(compute_lengths(np.diff(line, axis=0)))])
+    distances = np.arange(0.5 * _LINE_STEP_PX, lengths[-1], _LINE_STEP_PX)
+    return np.column_stack([np.interp(distances, lengths, coordinates) for coordinates in line.T])
+
+
+def _count_points(boxes: FloatArray, points: FloatArray) -> IntArray:
+    """Return the number of points in each of n boxes, (n,)."""
+    is_above_minimum = points > boxes[:, None, :2]
+    is_below_maximum = points < boxes[:, None, 2:]
+    counts: IntArray = (is_above_minimum & is_below_maximum).all(axis=2).sum(axis=1)
+    return counts
 
 
 def _compute_overlaps(boxes: FloatArray, others: FloatArray) -> FloatArray:

@@ -339,7 +339,7 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     for point in sorted(points, key=lambda point: point.is_bundled):
         _draw_pareto_point(axes, point)
     _style_pareto_axes(axes, points, axis_label)
-    _label_pareto_points(axes, points)
+    _label_pareto_points(axes, points, front)
     return figure
 
 
@@ -373,12 +373,13 @@ def _style_pareto_axes(axes: Axes, points: Sequence[ParetoPoint], axis_label: st
     style_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
 
 
-def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
-    """Write the label of each controller next to its mark."""
+def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint], front: FloatArray) -> None:
+    """Write the label of each controller next to its mark and, if possible, not on the Pareto front."""
     labels = [point.label for point in points]
     axes.autoscale_view()  # The transformation of the data is only valid when the limits are known.
     marks = axes.transData.transform([(point.x, point.gap) for point in points])
-    centers = place_labels(marks, labels, axes.bbox.extents)
+    front_line = axes.transData.transform(front)
+    centers = place_labels(marks, labels, axes.bbox.extents, front_line)
     half_sizes = compute_half_sizes(labels)
     for point, mark, center, half_size in zip(points, marks, centers, half_sizes, strict=True):
         offset = compute_nearest_points(mark, center, half_size) - mark
