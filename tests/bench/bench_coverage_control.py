@@ -113,7 +113,8 @@ def compute_density(peaks: Sequence[Peak]) -> FloatArray:
         squared_distances = (centers - peak.x) ** 2 + (centers[:, None] - peak.y) ** 2
         is_near = squared_distances <= (TRUNCATION * peak.sigma) ** 2
         density += np.where(is_near, peak.mass * mass_x * mass_y[:, None], 0.0)
-    return density / density.max()
+    relative: FloatArray = density / density.max()
+    return relative
 
 
 def compute_cost(density: FloatArray, positions: FloatArray) -> float:

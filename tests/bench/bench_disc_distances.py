@@ -51,7 +51,8 @@ def build_sites(area: shapely.Geometry, lattice: int) -> FloatArray:
     centers = spacing * (np.arange(lattice) + 0.5)
     x, y = np.meshgrid(low_x + centers, low_y + centers)
     points = np.column_stack([x.ravel(), y.ravel()])
-    return points[shapely.intersects_xy(area, *points.T)]
+    sites: FloatArray = points[shapely.intersects_xy(area, *points.T)]
+    return sites
 
 
 def compute_relative_excess(

@@ -54,7 +54,7 @@ class Setting(NamedTuple):
 def simulate(setting: Setting, refinement: int, duration: float) -> Run:
     """Simulate a setting with a control period of `DEFAULT_PERIOD_S` / `refinement`."""
     environment = load_map(setting.map)
-    limits: dict[str, float] = {}
+    limits: dict[str, Any] = {}
     if not setting.has_limits:
         limits = {"max_speed": NO_LIMIT, "max_acceleration": NO_LIMIT}
     simulation = Simulation(

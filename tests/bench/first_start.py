@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -42,8 +43,8 @@ KEY_INTERVAL_S = 0.25
 POLL_INTERVAL_S = 0.02
 THEME_KEY = "t"
 FIRST_CARD_KEY = "1"
-WINDOW_COMMANDS = (("demo",), ("demo", "rooms"), ("edit",))
-SERVED_COMMANDS = (("demo", "rooms"), ("demo", "rooms", "--each"), ("edit",))
+WINDOW_COMMANDS: Sequence[Sequence[str]] = (("demo",), ("demo", "rooms"), ("edit",))
+SERVED_COMMANDS: Sequence[Sequence[str]] = (("demo", "rooms"), ("demo", "rooms", "--each"), ("edit",))
 
 MEASURE_RESPONSES = """
 const [seconds, interval, key, done] = arguments;
@@ -194,15 +195,20 @@ def is_dark(screen: Screen) -> bool:
     return float(np.mean(green)) < 128.0
 
 
+def has_changed(screen: Screen, *, was_dark: bool) -> bool:
+    """Return whether the screen has become dark or bright since it was looked at."""
+    return is_dark(screen) != was_dark
+
+
 def measure_responses(screen: Screen, duration_s: float) -> list[float]:
     """Press the key again and again for a time, s; return the response times, s."""
     times: list[float] = []
     end_time = time.monotonic() + duration_s
     while time.monotonic() < end_time:
-        before = is_dark(screen)
+        was_dark = is_dark(screen)
         start_time = time.monotonic()
         screen.press(THEME_KEY)
-        wait_until(lambda before=before: is_dark(screen) != before)
+        wait_until(partial(has_changed, screen, was_dark=was_dark))
         times.append(time.monotonic() - start_time)
         time.sleep(KEY_INTERVAL_S)
     return times

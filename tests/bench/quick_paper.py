@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -20,7 +21,7 @@ from robocov_app.replication.claims.registration import load_registration
 from robocov_app.replication.design import plan
 
 
-def test_the_quick_study_confirms_the_clear_claims(tmp_path, monkeypatch):
+def test_the_quick_study_confirms_the_clear_claims(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     short_study = replace(plan.QUICK, duration=30.0, rho_0=(2.0,), k_att=(3.0,))
     monkeypatch.setattr(plan, "QUICK", short_study)
     out = tmp_path / "out"

@@ -26,7 +26,7 @@ from random_maps import KINDS, SIDE, build_random_map, draw_positions
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.typing import FloatArray
+from robocov.typing import FloatArray, Point
 
 REPORT_INTERVAL_S = 10.0
 MAX_OBSTACLES = 49
@@ -86,10 +86,10 @@ def draw_case(seed: int) -> Case:
     )
 
 
-def list_well_placed(environment: Environment, points: FloatArray) -> list[list[float]]:
+def list_well_placed(environment: Environment, points: FloatArray) -> list[Point]:
     """Return the points that rounding cannot move across a wall."""
     free = environment.free
-    return [p for p in points.tolist() if brute_force_geodesic.is_well_placed(free, tuple(p), SIDE)]
+    return [(x, y) for x, y in points.tolist() if brute_force_geodesic.is_well_placed(free, (x, y), SIDE)]
 
 
 def compute_brute_force_error(environment: Environment, positions: FloatArray) -> float | None:
@@ -103,8 +103,8 @@ def compute_brute_force_error(environment: Environment, positions: FloatArray) -
     if not robots or not points:
         return None
     expected = brute_force_geodesic.compute_distances(environment.free, robots, points).min(axis=0)
-    is_compared = [p in points for p in cost.points.tolist()]
-    distances = cost(robots).distances[is_compared]
+    is_compared = [(x, y) in points for x, y in cost.points.tolist()]
+    distances = cost(np.array(robots)).distances[is_compared]
     is_reached = np.isfinite(expected)
     assert (np.isfinite(distances) == is_reached).all()
     if not is_reached.any():

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov.controllers import LocalSearch, inform_controller
+from robocov.controllers import LocalSearch
 from robocov.controllers.placement.placement_controller import PlacementMemory
 from robocov.environment import Environment
 from robocov.errors import RobocovError
@@ -150,7 +150,7 @@ def collect_run(rng: np.random.Generator, network: Network | None) -> tuple[Floa
     communication_range = SHORT_RANGE_M if rng.random() < SHORT_RANGE_PROBABILITY else np.inf
     team = Team.homogeneous(robots, communication_range=communication_range)
     starts = environment.start(start_name).sample(robots, seed=int(rng.integers(2**31)))
-    lesson = Lesson(inform_controller(LocalSearch(nodes=400.0), environment), network)
+    lesson = Lesson(LocalSearch(nodes=400.0).inform(environment), network)
     simulation = Simulation(environment, lesson, starts, team, DT_S)
     for _ in range(round(DURATION_S / DT_S)):
         simulation.step()
