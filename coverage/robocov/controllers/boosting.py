@@ -34,7 +34,7 @@ from robocov.observation.scanned_view import (
     is_behind_wall,
     is_path_clear,
 )
-from robocov.typing import FloatArray
+from robocov.typing import BoolArray, FloatArray
 
 _SAMPLES_PER_RAY = 10
 """Number of samples for integrals along a ray."""
@@ -168,6 +168,8 @@ class BoostingMemory(Memory):
     speed_fraction: FloatArray | None = None
     """(n,) Fraction of full speed at which each robot follows the gradient."""
     ascents: tuple[Ascent, ...] = ()
+    is_driven: BoolArray | None = None
+    """(n,) Whether the last force on each robot was not zero."""
 
 
 class Contributions(NamedTuple):
@@ -280,7 +282,8 @@ class Boosting(BaseController):
         # Robots follow the same gradient until the next scan.
         if gradient is None or speed_fraction is None or seen.scans is not None:
             contributions = self.compute_contributions(seen, view, max_distances)
-            ascents = self._update_ascents(ascents, seen, contributions.value)
+            is_absent = _find_absent_robots(seen, memory.is_driven)
+            ascents = self._update_ascents(ascents, seen, contributions.value, is_absent)
             is_boosted = np.array([ascent.mode is Mode.BOOSTED for ascent in ascents])
             gradient = np.where(is_boosted[:, None], contributions.boosted_gradient, contributions.gradient)
             speed_fraction = compute_speed_fractions(gradient, memory.gradient, speed_fraction)
@@ -308,20 +311,25 @@ class Boosting(BaseController):
                 gradient=gradient,
                 speed_fraction=speed_fraction,
                 ascents=ascents,
+                is_driven=(forces != 0.0).any(axis=1),
             ),
         )
 
     def _update_ascents(
-        self, ascents: tuple[Ascent, ...], seen: Observations, values: FloatArray
+        self, ascents: tuple[Ascent, ...], seen: Observations, values: FloatArray, is_absent: BoolArray
     ) -> tuple[Ascent, ...]:
-        """Return the ascents after a scan."""
+        """Return the ascents after a scan. Those of absent robots start when the robots join."""
+        new_ascents = tuple(Ascent(copy_read_only(position), seen.time) for position in seen.positions)
         if not ascents:
-            ascents = tuple(Ascent(copy_read_only(position), seen.time) for position in seen.positions)
+            ascents = new_ascents
         limits = BoostLimits(int(self.boosts), self.patience)
-        return tuple(
-            ascent.update(position, seen.time, value, limits)
-            for ascent, position, value in zip(ascents, seen.positions, values.tolist(), strict=True)
-        )
+        updated = []
+        for robot, value in enumerate(values.tolist()):
+            if is_absent[robot]:
+                updated.append(new_ascents[robot])
+            else:
+                updated.append(ascents[robot].update(seen.positions[robot], seen.time, value, limits))
+        return tuple(updated)
 
     def compute_contributions(
         self, seen: Observations, view: View, max_distances: FloatArray
@@ -424,6 +432,20 @@ class Boosting(BaseController):
         growth = integrate_over_edges(edges, view, samples.depths, integrand)
         edge_terms = sum_by_robot(edges.robots, growth, len(max_distances))
         return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + edge_terms)
+
+
+def _find_absent_robots(seen: Observations, is_driven: BoolArray | None) -> BoolArray:
+    """Return which robots do not react to a force: they have not joined yet, or have failed, (n,).
+
+    Without this distinction, a robot that joins late would have used up its boosts before.
+    """
+    if is_driven is None:
+        return np.zeros(len(seen.positions), dtype=bool)
+    is_still = (seen.velocities == 0.0).all(axis=1)
+    if seen.steering is not None:
+        # A unicycle that turns in place reacts as well.
+        is_still &= seen.steering[:, 1] == 0.0
+    return np.asarray(is_driven & is_still)
 
 
 @kernel

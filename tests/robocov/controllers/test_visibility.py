@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
+from robocov.conditions import Conditions, Join
 from robocov.controllers import Boosting, Visibility
 from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_miss_probabilities
 from robocov.controllers.visibility import find_points_in_own_cell
@@ -240,6 +241,22 @@ def test_boosts_lead_to_where_no_robot_detects() -> None:
         contributions = Boosting(boost=boost).compute_contributions(seen, view, np.full(2, 3.0))
         assert not np.allclose(contributions.gradient, contributions.boosted_gradient)
         assert contributions.boosted_gradient[0, 0] < 0.0 < contributions.boosted_gradient[1, 0]
+
+
+@pytest.mark.parametrize("track_width", [0.0, 0.16])
+def test_a_robot_that_joins_late_has_all_its_boosts(track_width: float) -> None:
+    room = Environment("room", ((0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0)))
+    team = Team.homogeneous(2, track_width=track_width)
+    conditions = Conditions(joins=(Join(2, 20.0, (1.0, 1.0)),))
+    simulation = Simulation(room, Boosting(), [[4.0, 1.0], [2.0, 2.0]], team, conditions=conditions)
+    simulation.run(20.0)
+    late = simulation.memory.ascents[1]
+    assert (late.mode, late.boost_count, late.trail) == (Mode.GRADIENT, 0, ())
+    assert simulation.memory.ascents[0].boost_count > 0
+    simulation.run(15.0)
+    late = simulation.memory.ascents[1]
+    assert late.boost_count > 0
+    assert np.linalg.norm(simulation.positions[1] - [1.0, 1.0]) > 0.5
 
 
 def test_an_ascent_is_boosted_at_rest_and_returns_to_a_better_optimum() -> None:
