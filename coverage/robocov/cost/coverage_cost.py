@@ -406,7 +406,17 @@ class CoverageCost:
         positions = _to_positions(positions)
         point = to_floats("point", point, "[x, y] in meters", InputError)
         distances = self.geodesics.compute_distances(point[None], positions)[0]
-        return self.geodesics.find_path(point, positions[int(distances.argmin())])
+        path = self.geodesics.find_path(point, positions[int(distances.argmin())])
+        return _remove_repeated_ends(path)
+
+
+def _remove_repeated_ends(path: FloatArray) -> FloatArray:
+    """Remove the corners of a path that are also its ends, so that each waypoint occurs once."""
+    if len(path) < 3:
+        return path
+    corners = path[1:-1]
+    is_end = (corners == path[0]).all(axis=1) | (corners == path[-1]).all(axis=1)
+    return np.concatenate([path[:1], corners[~is_end], path[-1:]])
 
 
 def _to_positions(values: object) -> FloatArray:

@@ -417,7 +417,7 @@ class Geodesics:
         -------
         (w, 2) array, m
             The source, the corners at which the path bends, and the target; of shape (0, 2) if there is no
-            path.
+            path. A corner that a straight path touches may be among them, even if it is an end of the path.
 
         Raises
         ------

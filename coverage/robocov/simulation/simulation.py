@@ -597,10 +597,11 @@ def _copy_knowledge(
 def _check_robots_fit(
     environment: Environment, team: Team, state: TeamState, conditions: Conditions | None, time: float
 ) -> None:
-    """Check that no working robot overlaps with a wall or another robot."""
+    """Check that no working robot overlaps with a wall, another working robot or a failed one."""
     max_overlap = MAX_START_OVERLAP_M
     if state.velocities is not None:
         # Bodies in contact overlap a little, and a moving robot may be in contact.
         max_overlap = 2.0 * MAX_PENETRATION_M
     is_working = None if conditions is None else conditions.find_working_robots(time, len(state))
-    require_free_starts(environment.at(time), state.positions, team, max_overlap, is_working)
+    is_failed = None if conditions is None else conditions.find_failed_robots(time, len(state))
+    require_free_starts(environment.at(time), state.positions, team, max_overlap, is_working, is_failed)

@@ -155,7 +155,8 @@ def require_free_starts(
     positions: FloatArray,
     team: Team,
     tolerance: float,
-    is_present: BoolArray | None = None,
+    is_working: BoolArray | None = None,
+    is_failed: BoolArray | None = None,
 ) -> None:
     """Raise an error if a robot starts inside a wall or inside another robot.
 
@@ -169,20 +170,23 @@ def require_free_starts(
         The n robots.
     tolerance : float, m
         Depth up to which overlaps are accepted.
-    is_present : (n,) bool array or None
-        Whether to check each robot; by default, all robots are checked.
+    is_working : (n,) bool array or None
+        Whether each robot works. Only working robots are checked; by default, all robots work.
+    is_failed : (n,) bool array or None
+        Whether each robot has failed, and is an obstacle to the others; by default, no robot has.
 
     Raises
     ------
     StartError
-        If a position is not finite, or a robot to check overlaps a wall or another robot to check.
+        If a position is not finite, or a working robot overlaps a wall or a robot that works or has failed.
     """
-    if is_present is None:
-        is_present = np.ones(len(positions), dtype=bool)
+    if is_working is None:
+        is_working = np.ones(len(positions), dtype=bool)
+    is_present = is_working if is_failed is None else is_working | is_failed
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
         raise StartError(f"starts[{i}]: expected finite numbers, got {positions[i].tolist()}")
     wall_distances = _compute_wall_distances(environment, positions)
-    for i in np.flatnonzero(is_present & (wall_distances < team.radius - tolerance)).tolist():
+    for i in np.flatnonzero(is_working & (wall_distances < team.radius - tolerance)).tolist():
         start = f"starts[{i}] = {format_position(positions[i, 0], positions[i, 1])}"
         if wall_distances[i] < 0.0:
             raise StartError(
@@ -194,7 +198,8 @@ def require_free_starts(
         )
     first, second, distances = find_close_pairs(positions, 2.0 * float(team.radius.max()))
     is_overlapping = distances < team.radius[first] + team.radius[second] - tolerance
-    for k in np.flatnonzero(is_overlapping & is_present[first] & is_present[second]).tolist():
+    is_checked = (is_working[first] & is_present[second]) | (is_present[first] & is_working[second])
+    for k in np.flatnonzero(is_overlapping & is_checked).tolist():
         raise StartError(
             f"starts[{first[k]}] and starts[{second[k]}] are {distances[k]:.3g} m apart: the robots overlap"
         )

@@ -123,6 +123,23 @@ def test_first_waypoints_are_those_of_the_shortest_paths():
         np.testing.assert_allclose(path[-2], result.first_waypoints[site], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("point", "robot", "bends"),
+    [
+        ([1.0, 3.0], [4.0, 4.0], []),
+        ([4.0, 4.0], [1.0, 3.0], []),
+        ([5.0, 4.0], [6.0, 4.0], []),
+        ([1.0, 3.0], [6.0, 4.0], [[4.0, 4.0]]),
+        ([4.0, 4.0], [4.0, 4.0], []),
+    ],
+)
+def test_each_waypoint_occurs_once_if_an_end_of_a_path_is_a_corner(point, robot, bends):
+    square = PolygonObstacle(((4.0, 2.0), (6.0, 2.0), (6.0, 4.0), (4.0, 4.0)))
+    hall = Environment("hall", ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)), (square,))
+    path = CoverageCost(hall, lattice=4).find_path(np.array([robot]), np.array(point))
+    assert path.tolist() == [point, *bends, robot]
+
+
 def test_the_gradient_is_that_of_the_value():
     cost = CoverageCost(OFFICE, lattice=40)
     rng = np.random.default_rng(8)

@@ -214,6 +214,19 @@ def test_starts_of_robots_that_join_later_may_overlap() -> None:
         Simulation(HALL, Rapf(), starts, conditions=Conditions(joins=((4, 1.0),)))
 
 
+def test_larger_robots_must_not_overlap_failed_ones() -> None:
+    conditions = Conditions(failures=((2, 0.1),), joins=((3, 5.0, (2.0, 2.2)),))
+    starts = np.array([[2.0, 2.0], [2.3, 2.0], [2.0, 2.2]])
+    simulation = Simulation(HALL, Rapf(), starts, conditions=conditions)
+    simulation.run(0.2)
+    team = Team.homogeneous(3, radius=0.2)
+    with pytest.raises(StartError, match=r"starts\[0\] and starts\[1\] are 0.3 m apart: the robots overlap"):
+        simulation.with_changes(team=team, positions=starts)
+    # The third robot has not joined yet.
+    apart = np.array([[1.0, 2.0], [2.3, 2.0], [1.0, 2.2]])
+    assert simulation.with_changes(team=team, positions=apart).is_working.tolist() == [True, False, False]
+
+
 def test_a_failure_does_not_affect_robots_elsewhere() -> None:
     """The world is rebuilt when robot 2 fails; robot 1, which leans on a wall, continues as before."""
     walled = Environment("walled", HALL.boundary, (WallObstacle(((5, 0), (5, 8)), 0.1),))
