@@ -4,6 +4,7 @@ Controllers:
 
 - `atlas`: `Atlas`, in which each robot plans on its own map
 - `atlas_shared`: `AtlasShared`, the same with maps that the robots share
+- `visits`: visits of robots to targets on frontiers
 - `frontier_median`, `greedy_submodular`, `voronoi_graph`: other planners on shared maps
 - `exploring_lloyd`: Lloyd's algorithm for a density that robots measure while they move
 

@@ -14,17 +14,20 @@ from robocov.controllers.exploration.shared_map import (
     Situation,
     assign_goals,
 )
+from robocov.controllers.exploration.visits import NO_VISIT, Visits
 from robocov.controllers.gains import gain
 from robocov.k_median import choose_greedily, improve_sources
 from robocov.planning.discovered_map import FREE, UNKNOWN, dilate
 from robocov.typing import FloatArray, IntArray
 
-_INSPECTED_RADIUS_M = 0.5
-"""Targets closer than this to an inspected target are not worth a visit."""
 _ARRIVAL_RADIUS_M = 0.3
 """Distance from a target at which a robot has inspected it."""
-_MIN_PROGRESS_M = 0.05
-"""A robot with a goal that moves less than this between two plans is stuck."""
+_WAITING_TIME_S = 3.0
+"""Time for which robots may wait at or before a target, s, before it is given up."""
+_TRAVEL_TIME_FACTOR = 2.0
+"""Maximum time to a target, relative to the time along the shortest path at the maximum speed."""
+_NO_TARGET = -1
+"""Index that stands for no target."""
 _BLOCK = np.ones((3, 3), dtype=bool)
 """A cell and its eight neighbors."""
 _BLOCK_RADIUS = 1.5
@@ -55,12 +58,18 @@ class FrontierMedian(SharedMapController):
 
     We had only the abstracts of the papers, not their full texts; details may differ. The following choices
     are our own. The distance between targets is the spacing of the planning lattice. Small gaps between rays
-    are ignored, and so are frontiers that are shorter than `shortest` or out of reach. A frontier is also
-    ignored after a robot has been there, or was stuck on its path to it. A robot stays where it is if no
-    target has any utility left for it; in the paper, it moves to a target even then.
+    are ignored, and so are frontiers that are shorter than `shortest` or out of reach.
 
-    Robots out of communication range are assumed to have reached their targets, which then count as
-    inspected. With a short range, robots may therefore stop exploring too early.
+    *Targets of others.* Robots out of communication range are assumed to be at their targets. Because this is
+    uncertain, the robots in range share these targets when no other target has any utility left for them. A
+    robot stays where it is if the targets of robots in range leave no utility for it; in the paper, it moves
+    to a target even then. With unlimited communication, this saves path length.
+
+    *End of exploration.* A target is not visited again after a robot has been there. Only robots in range
+    count, because robots out of range may never have arrived. A target is given up when robots in range have
+    headed for it for longer than 3 s plus twice the time that the nearest of them needs at its maximum speed.
+    Every exploration therefore comes to an end. Targets closer than 0.5 m to each other count as one.
+    Frontiers that only robots out of range could reach are not waited for.
     """
 
     name = "frontier-median"
@@ -76,33 +85,32 @@ class FrontierMedian(SharedMapController):
 
     def compute_placement(self, situation: Situation) -> Placement:
         """Compute targets on frontiers or, if there are none, the final goals."""
-        inspected = self._list_inspected_targets(situation)
-        targets = self._find_targets(situation, inspected)
+        visits = _stop_visits(situation)
+        targets = self._find_targets(situation, visits)
         path_lengths = self._compute_path_lengths(situation, targets)
-        is_reachable = np.isfinite(path_lengths).any(axis=0)
-        if is_reachable.any():
-            goals = self._assign_targets(situation, targets[is_reachable], path_lengths[:, is_reachable])
-            return Placement(goals=goals, is_final=False, inspected_targets=inspected)
-        return Placement(goals=self._compute_median(situation), is_final=True, inspected_targets=inspected)
+        # Robots out of range may not be where they are assumed to be: do not wait for them.
+        is_heard = situation.group.is_heard
+        is_reachable = np.isfinite(path_lengths[is_heard]).any(axis=0)
+        if not is_reachable.any():
+            return Placement(goals=self._compute_median(situation), is_final=True, visits=visits)
+        targets = targets[is_reachable]
+        path_lengths = path_lengths[:, is_reachable]
+        assignment = np.full(len(is_heard), _NO_TARGET)
+        assignment = self._assign_targets(situation, targets, path_lengths, assignment)
+        # Robots out of range may never arrive: other robots that would remain without a target share theirs.
+        assignment[is_heard] = self._assign_targets(
+            situation, targets, path_lengths[is_heard], assignment[is_heard]
+        )
+        goals = np.where((assignment == _NO_TARGET)[:, None], situation.positions, targets[assignment])
+        for target in np.unique(assignment[is_heard & (assignment != _NO_TARGET)]):
+            is_visitor = is_heard & (assignment == target)
+            duration = path_lengths[is_visitor, target].min() / situation.body.max_speed
+            limit = _WAITING_TIME_S + _TRAVEL_TIME_FACTOR * duration
+            visits = visits.start(targets[target], is_visitor, limit)
+        return Placement(goals=goals, is_final=False, visits=visits)
 
-    def _list_inspected_targets(self, situation: Situation) -> FloatArray:
-        """Return the targets that need no further visit, (t, 2) in meters."""
-        previous_plan = situation.previous_plan
-        if previous_plan is None:
-            return np.empty((0, 2))
-        inspected = previous_plan.placement.inspected_targets
-        if previous_plan.placement.is_final:
-            return inspected
-        goals = situation.previous_goals
-        has_arrived = np.sqrt(((situation.positions - goals) ** 2).sum(axis=1)) < _ARRIVAL_RADIUS_M
-        # The previous group may have consisted of other robots: the nearest previous position counts.
-        moves = situation.positions[:, None] - previous_plan.group.positions
-        progress = np.sqrt((moves**2).sum(axis=2)).min(axis=1)
-        is_stuck = np.isfinite(goals[:, 0]) & (progress < _MIN_PROGRESS_M)
-        return np.unique(np.vstack([inspected, goals[has_arrived | is_stuck]]), axis=0)
-
-    def _find_targets(self, situation: Situation, inspected: FloatArray) -> FloatArray:
-        """Return positions on the frontiers, (t, 2) m."""
+    def _find_targets(self, situation: Situation, visits: Visits) -> FloatArray:
+        """Return the targets on the frontiers whose visits are not over, (t, 2) m."""
         raster = situation.known_map.raster
         map_window = situation.planner.map_window
         window = map_window.window
@@ -114,8 +122,7 @@ class FrontierMedian(SharedMapController):
         pairs = labels[rows, columns] * len(map_window.nodes) + nodes
         _, first = np.unique(pairs, return_index=True)
         targets = raster.compute_centers(rows[first] + window.first_row, columns[first] + window.first_column)
-        squared_distances = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
-        return np.asarray(targets[squared_distances > _INSPECTED_RADIUS_M**2])
+        return np.asarray(targets[~visits.find_excluded(targets)])
 
     def _label_frontiers(self, situation: Situation) -> IntArray:
         """Return the label of the frontier, from 1, to which each cell of the window belongs; 0 for none."""
@@ -147,32 +154,38 @@ class FrontierMedian(SharedMapController):
         )
 
     def _assign_targets(
-        self, situation: Situation, targets: FloatArray, path_lengths: FloatArray
-    ) -> FloatArray:
-        """Return the target of each robot, (k, 2) m, or its position if it has no target.
+        self, situation: Situation, targets: FloatArray, path_lengths: FloatArray, assignment: IntArray
+    ) -> IntArray:
+        """Assign targets to those of k robots that have none.
 
         The pair of a robot and a target with the largest U - β V is assigned first; see `FrontierMedian`.
+
+        Parameters
+        ----------
+        situation : Situation
+        targets : (t, 2) array, m
+        path_lengths : (k, t) array, m
+            Path length from each robot to each target; infinite without a path.
+        assignment : (k,) int array
+            Index of the target of each robot, or `_NO_TARGET`.
+
+        Returns
+        -------
+        (k,) int array
+            The assignment, with `_NO_TARGET` for robots for which no target has any utility left.
         """
-        planner = situation.planner
-        goals = situation.positions.copy()
+        assignment = assignment.copy()
         utilities = np.ones(len(targets))
-        is_unassigned = np.ones(len(goals), dtype=bool)
-        for _ in range(len(goals)):
-            is_possible = is_unassigned[:, None] & (utilities > 0.0)
+        for target in assignment[assignment != _NO_TARGET].tolist():
+            utilities -= _compute_visibilities(situation, targets, target)
+        while True:
+            is_possible = (assignment == _NO_TARGET)[:, None] & (utilities > 0.0)
             values = np.where(is_possible, utilities - self.beta * path_lengths, -np.inf)
             robot, target = np.unravel_index(values.argmax(), values.shape)
             if values[robot, target] == -np.inf:
-                break
-            goals[robot] = targets[target]
-            is_unassigned[robot] = False
-            # The robot will also see the other targets in view of its own, so these become less useful.
-            distances = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
-            is_clear = planner.visibility.find_clear_lines(
-                targets[target], targets, planner.map_window.is_blocked
-            )
-            is_in_view = (distances < situation.sensing_range) & is_clear
-            utilities -= np.where(is_in_view, 1.0 - distances / situation.sensing_range, 0.0)
-        return goals
+                return assignment
+            assignment[robot] = target
+            utilities -= _compute_visibilities(situation, targets, int(target))
 
     def _compute_median(self, situation: Situation) -> FloatArray:
         """Return the final goals of all robots, (k, 2) m."""
@@ -191,3 +204,36 @@ class FrontierMedian(SharedMapController):
             min_saving = 0.0
         chosen = improve_sources(candidates.table, first, np.zeros(count, dtype=bool), min_saving)
         return assign_goals(situation, candidates.refine(situation, weights, chosen))
+
+
+def _stop_visits(situation: Situation) -> Visits:
+    """Return the visits after the time since the last plan.
+
+    The positions of robots out of range are only assumed, so their visits take no time and do not
+    end.
+    """
+    group = situation.group
+    robots_on_visit = np.full(len(group.robots), NO_VISIT)
+    previous_plan = situation.previous_plan
+    if previous_plan is None or previous_plan.placement.visits is None:
+        return Visits.build_empty(len(group.robots))
+    visits = previous_plan.placement.visits
+    rows, previous_rows = situation.match_robots(previous_plan)
+    robots_on_visit[rows] = visits.current[previous_rows]
+    robots_on_visit[~group.is_heard] = NO_VISIT
+    distances = np.sqrt(((situation.positions - situation.previous_goals) ** 2).sum(axis=1))
+    return visits.stop(
+        robots_on_visit,
+        has_arrived=distances < _ARRIVAL_RADIUS_M,
+        time_spent=group.time - previous_plan.group.time,
+    )
+
+
+def _compute_visibilities(situation: Situation, targets: FloatArray, target: int) -> FloatArray:
+    """Return by how much the utility of each target decreases if a robot visits one of them, (t,)."""
+    planner = situation.planner
+    sensing_range = situation.body.sensing_range
+    distances = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
+    is_clear = planner.visibility.find_clear_lines(targets[target], targets, planner.map_window.is_blocked)
+    is_in_view = (distances < sensing_range) & is_clear
+    return np.where(is_in_view, 1.0 - distances / sensing_range, 0.0)

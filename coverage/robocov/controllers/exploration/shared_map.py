@@ -14,6 +14,7 @@ from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Informati
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.exploration.scan_exchange import ScanExchange
+from robocov.controllers.exploration.visits import Visits
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.density import Density
 from robocov.k_median import run_lloyd
@@ -51,6 +52,27 @@ class Group(NamedTuple):
     message_times: FloatArray
     """(k,) s, times of their last messages."""
 
+    @property
+    def time(self) -> float:
+        """Time at which the robot plans, s. It knows its own position at that time."""
+        return float(self.message_times.max())
+
+    @property
+    def is_heard(self) -> BoolArray:
+        """Whether the position of each robot is known at present rather than assumed, (k,)."""
+        return np.asarray(self.message_times == self.time)
+
+
+class Body(NamedTuple):
+    """The parameters of a robot that matter for its plans."""
+
+    radius: float
+    """m."""
+    max_speed: float
+    """m/s."""
+    sensing_range: float
+    """m."""
+
 
 class Placement(NamedTuple):
     """Goals of a group of robots, and whether they are final."""
@@ -59,9 +81,8 @@ class Placement(NamedTuple):
     """(k, 2) m, in the order of the robots of the group."""
     is_final: bool
     """Whether the goals stay the same until the map, the density or the group changes."""
-    inspected_targets: FloatArray = np.empty((0, 2))
-    """(t, 2) m, targets on frontiers that need no further visit: a robot has been there, or was stuck on its
-    path. Empty for controllers that do not explore frontiers."""
+    visits: Visits | None = None
+    """The visits to targets on frontiers; None for controllers that do not explore frontiers."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,16 +105,43 @@ class Plan:
 class Situation(NamedTuple):
     """Situation of a robot that plans for k robots: itself and the robots it has received messages from."""
 
-    positions: FloatArray
-    """(k, 2) m, known or assumed positions of the robots."""
-    previous_goals: FloatArray
-    """(k, 2) m, goals of the robots in the last plan; nan for robots without one."""
+    group: Group
+    """The k robots."""
     previous_plan: Plan | None
     known_map: DiscoveredMap
     planner: GridPlanner
     density: Density | None
-    sensing_range: float
-    """Sensing range of the robot that plans, m."""
+    body: Body
+    """The body of the robot that plans."""
+
+    @property
+    def positions(self) -> FloatArray:
+        """Known or assumed positions of the robots, (k, 2) m."""
+        return self.group.positions
+
+    @property
+    def previous_goals(self) -> FloatArray:
+        """Goals of the robots in the last plan, (k, 2) m; nan for robots without one."""
+        goals = np.full(self.positions.shape, np.nan)
+        if self.previous_plan is not None:
+            rows, previous_rows = self.match_robots(self.previous_plan)
+            goals[rows] = self.previous_plan.placement.goals[previous_rows]
+        return goals
+
+    def match_robots(self, plan: Plan) -> tuple[IntArray, IntArray]:
+        """Find the robots that are also in the group of a plan.
+
+        Parameters
+        ----------
+        plan : Plan
+
+        Returns
+        -------
+        rows, plan_rows : (j,) int arrays
+            Index of each of these robots in this group and in that of the plan.
+        """
+        _, rows, plan_rows = np.intersect1d(self.group.robots, plan.group.robots, return_indices=True)
+        return rows, plan_rows
 
     def compute_weights(self, is_counted: BoolArray) -> FloatArray:
         """Compute the weights of the nodes of the planner.
@@ -368,14 +416,15 @@ class SharedMapController(BaseController):
         for robot, previous_plan in enumerate(memory.plans):
             known_map = memory.maps[robot]
             group = _build_group(seen, memory.team, previous_plan, robot)
-            radius = float(memory.team.radius[robot])
-            sensing_range = float(memory.team.sensing_range[robot])
+            body = Body(
+                radius=float(memory.team.radius[robot]),
+                max_speed=float(memory.team.max_speed[robot]),
+                sensing_range=float(memory.team.sensing_range[robot]),
+            )
             arrays = tuple(column.tobytes() for column in group)
-            key = (id(known_map), id(previous_plan), radius, sensing_range, *arrays)
+            key = (id(known_map), id(previous_plan), body, *arrays)
             if key not in plans_by_knowledge:
-                plans_by_knowledge[key] = self._make_plan(
-                    seen, known_map, previous_plan, group, radius, sensing_range
-                )
+                plans_by_knowledge[key] = self._make_plan(seen, known_map, previous_plan, group, body)
             plans.append(plans_by_knowledge[key])
         return tuple(plans)
 
@@ -385,34 +434,27 @@ class SharedMapController(BaseController):
         known_map: DiscoveredMap,
         previous_plan: Plan | None,
         group: Group,
-        radius: float,
-        sensing_range: float,
+        body: Body,
     ) -> Plan:
-        """Return the plan of a robot with a radius and a sensing range in m, for its group.
+        """Return the plan of a robot for its group.
 
         A final plan that is still valid is returned with the current positions of the group.
         """
         if previous_plan is not None and _is_still_valid(previous_plan, known_map, seen.density, group):
             return replace(previous_plan, group=group)
         window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
-        previous_goals = np.full(group.positions.shape, np.nan)
         if previous_plan is None:
-            planner = GridPlanner(known_map, window, radius + self.clearance)
+            planner = GridPlanner(known_map, window, body.radius + self.clearance)
         else:
             planner = previous_plan.planner
-            _, rows, previous_rows = np.intersect1d(
-                group.robots, previous_plan.group.robots, return_indices=True
-            )
-            previous_goals[rows] = previous_plan.placement.goals[previous_rows]
         planner = planner.update(known_map, window)
         situation = Situation(
-            positions=group.positions,
-            previous_goals=previous_goals,
+            group=group,
             previous_plan=previous_plan,
             known_map=known_map,
             planner=planner,
             density=seen.density,
-            sensing_range=sensing_range,
+            body=body,
         )
         return Plan(
             group=group,

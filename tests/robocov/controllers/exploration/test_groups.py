@@ -8,6 +8,7 @@ from planning_cases import REGION, build_map, build_planner
 
 from robocov.controllers.exploration.shared_map import (
     MAX_SILENCE_S,
+    Body,
     Group,
     Placement,
     Plan,
@@ -25,13 +26,12 @@ def test_goals_are_assigned_by_squared_path_lengths() -> None:
     positions = np.array([[1.0, 1.0], [3.0, 1.0]])
     goals = np.array([[4.0, 2.4], [3.0, 1.0]])
     situation = Situation(
-        positions=positions,
-        previous_goals=np.full((2, 2), np.nan),
+        group=Group(robots=np.arange(2), positions=positions, message_times=np.zeros(2)),
         previous_plan=None,
         known_map=build_map(),
         planner=build_planner(),
         density=None,
-        sensing_range=3.0,
+        body=Body(radius=0.1, max_speed=1.0, sensing_range=3.0),
     )
     np.testing.assert_array_equal(assign_goals(situation, goals), goals[[1, 0]])
 

@@ -13,7 +13,16 @@ from robocov.controllers import CONTROLLERS, Rapf, get_information, make_control
 from robocov.controllers.exploration.frontier_median import FrontierMedian
 from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.scan_exchange import ScanExchange
-from robocov.controllers.exploration.shared_map import Candidates, Situation, assign_goals
+from robocov.controllers.exploration.shared_map import (
+    Body,
+    Candidates,
+    Group,
+    Placement,
+    Plan,
+    Situation,
+    assign_goals,
+)
+from robocov.controllers.exploration.visits import VISIT_RADIUS_M
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
@@ -55,15 +64,38 @@ def build_situation(state: np.ndarray, positions: list[list[float]]) -> Situatio
     """Return the situation of robots without a previous plan on a map with given cells."""
     known_map = DiscoveredMap(RASTER, state.astype(np.uint8))
     window = Window.build_around(RASTER, np.array([1.0, 1.0]), np.inf, 400)
+    robot_count = len(positions)
     return Situation(
-        positions=np.array(positions),
-        previous_goals=np.full((len(positions), 2), np.nan),
+        group=Group(np.arange(robot_count), np.array(positions), message_times=np.zeros(robot_count)),
         previous_plan=None,
         known_map=known_map,
         planner=GridPlanner(known_map, window, 0.13),
         density=None,
-        sensing_range=3.0,
+        body=Body(radius=0.1, max_speed=1.0, sensing_range=3.0),
     )
+
+
+def continue_situation(
+    situation: Situation, placement: Placement, positions: np.ndarray, message_times: list[float]
+) -> Situation:
+    """Return the situation after a plan, with the same map."""
+    previous_plan = Plan(
+        group=situation.group,
+        placement=placement,
+        known_map=situation.known_map,
+        planner=situation.planner,
+        density=None,
+    )
+    group = Group(situation.group.robots, np.asarray(positions), np.array(message_times))
+    return situation._replace(group=group, previous_plan=previous_plan)
+
+
+def build_state_with_unknown_sides() -> np.ndarray:
+    """Return the cells of a map whose left and right sides are unknown."""
+    state = np.full(RASTER.shape, FREE)
+    state[:, :20] = UNKNOWN
+    state[:, 60:] = UNKNOWN
+    return state
 
 
 @pytest.mark.slow
@@ -166,9 +198,7 @@ def test_single_unknown_cells_are_not_a_frontier() -> None:
 
 def test_robots_move_to_different_frontiers() -> None:
     """Both sides of the map are unknown."""
-    state = np.full(RASTER.shape, FREE)
-    state[:, :20] = UNKNOWN
-    state[:, 60:] = UNKNOWN
+    state = build_state_with_unknown_sides()
     placement = FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS))
     assert not placement.is_final
     x = np.sort(placement.goals[:, 0])
@@ -208,26 +238,93 @@ def test_robots_move_to_a_voronoi_graph_that_has_fewer_vertices_than_there_are_r
     assert (distances[~is_moving] < 0.1).all()
 
 
-@pytest.mark.parametrize("is_stuck", [False, True], ids=["inspected", "out of reach"])
-def test_targets_are_not_visited_again(is_stuck: bool) -> None:
-    """A target is done when a robot has arrived, and given up when its robot has not moved."""
-    simulation = build_simulation("frontier-median")
-    for _ in range(5):
-        simulation.step()
-    plan = simulation.memory.plans[0]
-    assert not plan.placement.is_final
-    situation = Situation(
-        positions=plan.group.positions if is_stuck else plan.placement.goals,
-        previous_goals=plan.placement.goals,
-        previous_plan=plan,
-        known_map=plan.known_map,
-        planner=plan.planner,
-        density=None,
-        sensing_range=3.0,
-    )
-    inspected = FrontierMedian().compute_placement(situation).inspected_targets
-    for goal in plan.placement.goals:
-        assert (np.hypot(*(inspected - goal).T) < 1e-9).any()
+def test_visits_are_over_when_robots_arrive() -> None:
+    situation = build_situation(build_state_with_unknown_sides(), THREE_ROBOTS)
+    first = FrontierMedian().compute_placement(situation)
+    assert first.visits is not None
+    later = continue_situation(situation, first, first.goals, [1.0, 1.0, 1.0])
+    second = FrontierMedian().compute_placement(later)
+    assert second.visits is not None
+    assert second.visits.find_excluded(first.goals).all()
+    distances = np.hypot(*(second.goals[:, None] - first.goals).transpose(2, 0, 1))
+    assert distances.min() >= VISIT_RADIUS_M
+
+
+def test_assumed_arrivals_end_no_visit() -> None:
+    """Robots 1 and 2 are out of range, and are assumed to have arrived."""
+    situation = build_situation(build_state_with_unknown_sides(), THREE_ROBOTS)
+    first = FrontierMedian().compute_placement(situation)
+    positions = first.goals.copy()
+    positions[0] = situation.positions[0]
+    later = continue_situation(situation, first, positions, [1.0, 0.0, 0.0])
+    second = FrontierMedian().compute_placement(later)
+    assert second.visits is not None
+    assert not second.visits.is_over.any()
+    assert not second.is_final
+
+
+def build_situation_with_short_frontier() -> Situation:
+    """Return the situation of five robots, for some of which the only frontier has no utility."""
+    state = np.full(RASTER.shape, FREE)
+    state[38:42, :4] = UNKNOWN
+    return build_situation(state, [[1.5 + 0.3 * k, 4.0] for k in range(5)])
+
+
+def test_robots_without_a_target_exclude_nothing() -> None:
+    situation = build_situation_with_short_frontier()
+    first = FrontierMedian().compute_placement(situation)
+    is_idle = (first.goals == situation.positions).all(axis=1)
+    assert 0 < is_idle.sum() < 5
+    later = continue_situation(situation, first, situation.positions, [1.0] * 5)
+    second = FrontierMedian().compute_placement(later)
+    assert second.visits is not None
+    assert not second.visits.is_over.any()
+    assert not second.visits.find_excluded(situation.positions).any()
+
+
+def test_targets_of_robots_out_of_range_are_shared() -> None:
+    """A robot remains without a target while it hears the others, and shares theirs when it does not."""
+    situation = build_situation_with_short_frontier()
+    first = FrontierMedian().compute_placement(situation)
+    is_idle = (first.goals == situation.positions).all(axis=1)
+    robot = int(is_idle.argmax())
+    message_times = [0.0] * 5
+    message_times[robot] = 1.0
+    later = continue_situation(situation, first, first.goals, message_times)
+    second = FrontierMedian().compute_placement(later)
+    assert (first.goals[~is_idle] == second.goals[robot]).all(axis=1).any()
+
+
+@pytest.mark.parametrize("is_moving", [False, True], ids=["at rest", "to and fro"])
+def test_targets_are_given_up_after_a_limited_time(is_moving: bool) -> None:
+    """One robot never arrives, and the other one is out of range."""
+    state = np.full(RASTER.shape, FREE)
+    state[38:42, :4] = UNKNOWN
+    situation = build_situation(state, [[2.0, 4.0], [6.0, 4.0]])
+    plan_counts: dict[tuple[float, ...], int] = {}
+    for time in range(60):
+        placement = FrontierMedian().compute_placement(situation)
+        if placement.is_final:
+            break
+        goal = tuple(placement.goals[0])
+        plan_counts[goal] = plan_counts.get(goal, 0) + 1
+        position = [2.0 + is_moving * (time % 2), 4.0]
+        situation = continue_situation(
+            situation, placement, np.array([position, placement.goals[1]]), [time + 1.0, 0.0]
+        )
+    assert placement.is_final
+    assert 3 < max(plan_counts.values()) < 20
+
+
+def test_robots_do_not_wait_for_one_out_of_range_that_alone_can_reach_a_frontier() -> None:
+    state = np.full(RASTER.shape, FREE)
+    state[:, :20] = UNKNOWN
+    state[:, 30:32] = WALL
+    situation = build_situation(state, [[2.5, 4.0], [6.0, 4.0]])
+    placement = FrontierMedian().compute_placement(situation)
+    assert not placement.is_final
+    later = continue_situation(situation, placement, placement.goals, [0.0, 1.0])
+    assert FrontierMedian().compute_placement(later).is_final
 
 
 def test_a_final_plan_is_computed_again_for_another_density() -> None:
