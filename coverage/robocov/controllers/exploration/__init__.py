@@ -4,7 +4,6 @@ Controllers:
 
 - `atlas`: `Atlas`, in which each robot plans on its own map
 - `atlas_shared`: `AtlasShared`, the same with maps that the robots share
-- `visits`: visits of robots to targets on frontiers
 - `frontier_median`, `greedy_submodular`, `voronoi_graph`: other planners on shared maps
 - `exploring_lloyd`: Lloyd's algorithm for a density that robots measure while they move
 
@@ -15,6 +14,10 @@ Parts of `Atlas`:
 - `team_goals`: goals for all robots of the team
 - `jams`, `staggering`: robots that block each other, and times that differ from robot to robot
 - `localization`: positions estimated from noisy or late measurements
+
+Part of `FrontierMedian`:
+
+- `visits`: visits of robots to targets on frontiers
 
 Parts of several controllers:
 
