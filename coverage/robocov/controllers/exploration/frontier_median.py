@@ -95,18 +95,14 @@ class FrontierMedian(SharedMapController):
             return Placement(goals=self._compute_median(situation), is_final=True, visits=visits)
         targets = targets[is_reachable]
         path_lengths = path_lengths[:, is_reachable]
-        assignment = np.full(len(is_heard), _NO_TARGET)
-        assignment = self._assign_targets(situation, targets, path_lengths, assignment)
-        # Robots out of range may never arrive: other robots that would remain without a target share theirs.
+        nobody = np.full(len(is_heard), _NO_TARGET)
+        assignment = self._assign_targets(situation, targets, path_lengths, nobody)
+        # Robots out of range may never arrive: robots in range without a target share theirs.
         assignment[is_heard] = self._assign_targets(
             situation, targets, path_lengths[is_heard], assignment[is_heard]
         )
         goals = np.where((assignment == _NO_TARGET)[:, None], situation.positions, targets[assignment])
-        for target in np.unique(assignment[is_heard & (assignment != _NO_TARGET)]):
-            is_visitor = is_heard & (assignment == target)
-            duration = path_lengths[is_visitor, target].min() / situation.body.max_speed
-            limit = _WAITING_TIME_S + _TRAVEL_TIME_FACTOR * duration
-            visits = visits.start(targets[target], is_visitor, limit)
+        visits = _start_visits(situation, visits, targets, path_lengths, assignment)
         return Placement(goals=goals, is_final=False, visits=visits)
 
     def _find_targets(self, situation: Situation, visits: Visits) -> FloatArray:
@@ -177,7 +173,7 @@ class FrontierMedian(SharedMapController):
         assignment = assignment.copy()
         utilities = np.ones(len(targets))
         for target in assignment[assignment != _NO_TARGET].tolist():
-            utilities -= _compute_visibilities(situation, targets, target)
+            utilities -= _compute_utility_losses(situation, targets, target)
         while True:
             is_possible = (assignment == _NO_TARGET)[:, None] & (utilities > 0.0)
             values = np.where(is_possible, utilities - self.beta * path_lengths, -np.inf)
@@ -185,7 +181,7 @@ class FrontierMedian(SharedMapController):
             if values[robot, target] == -np.inf:
                 return assignment
             assignment[robot] = target
-            utilities -= _compute_visibilities(situation, targets, int(target))
+            utilities -= _compute_utility_losses(situation, targets, int(target))
 
     def _compute_median(self, situation: Situation) -> FloatArray:
         """Return the final goals of all robots, (k, 2) m."""
@@ -209,15 +205,14 @@ class FrontierMedian(SharedMapController):
 def _stop_visits(situation: Situation) -> Visits:
     """Return the visits after the time since the last plan.
 
-    The positions of robots out of range are only assumed, so their visits take no time and do not
-    end.
+    The positions of robots out of range are only assumed, so their visits take no time and do not end.
     """
     group = situation.group
-    robots_on_visit = np.full(len(group.robots), NO_VISIT)
     previous_plan = situation.previous_plan
     if previous_plan is None or previous_plan.placement.visits is None:
         return Visits.build_empty(len(group.robots))
     visits = previous_plan.placement.visits
+    robots_on_visit = np.full(len(group.robots), NO_VISIT)
     rows, previous_rows = situation.match_robots(previous_plan)
     robots_on_visit[rows] = visits.current[previous_rows]
     robots_on_visit[~group.is_heard] = NO_VISIT
@@ -229,8 +224,24 @@ def _stop_visits(situation: Situation) -> Visits:
     )
 
 
-def _compute_visibilities(situation: Situation, targets: FloatArray, target: int) -> FloatArray:
-    """Return by how much the utility of each target decreases if a robot visits one of them, (t,)."""
+def _start_visits(
+    situation: Situation, visits: Visits, targets: FloatArray, path_lengths: FloatArray, assignment: IntArray
+) -> Visits:
+    """Return the visits after the robots in range have started to head for their targets.
+
+    The arrays are those of `FrontierMedian._assign_targets`.
+    """
+    is_visiting = situation.group.is_heard & (assignment != _NO_TARGET)
+    for target in np.unique(assignment[is_visiting]):
+        is_visitor = is_visiting & (assignment == target)
+        travel_time = path_lengths[is_visitor, target].min() / situation.body.max_speed
+        limit = _WAITING_TIME_S + _TRAVEL_TIME_FACTOR * travel_time
+        visits = visits.start(targets[target], is_visitor, limit)
+    return visits
+
+
+def _compute_utility_losses(situation: Situation, targets: FloatArray, target: int) -> FloatArray:
+    """Return by how much the utility of each of t targets decreases if a robot visits one of them, (t,)."""
     planner = situation.planner
     sensing_range = situation.body.sensing_range
     distances = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
