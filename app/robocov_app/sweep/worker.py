@@ -54,8 +54,8 @@ Watch: TypeAlias = Callable[[Snapshot], object]
 """Receives the observations and decisions of a run, step by step."""
 _execution_lock = threading.Lock()
 _RESULTS_VERSION = 5
-"""Number to be increased in each release in which the same inputs give other results. Since version 5, robots share maps by
-messages, and the cost counts no paths through gaps that are narrower than a robot."""
+"""Number to be increased in each release in which the same inputs give other results. Since version 5, robots
+share maps by messages, and the cost counts no paths through gaps that are narrower than a robot."""
 
 
 @cache
