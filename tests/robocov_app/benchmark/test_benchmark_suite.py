@@ -64,9 +64,8 @@ def test_a_changed_map_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_name_of_a_ranking_selects_all_of_its_tracks() -> None:
-    expected = suite.select_maps(
-        ["plans-small", "plans-medium", "plans-large", "plans-crowd"], [], quick=False
-    )
+    tracks = ["plans-one-robot", "plans-small", "plans-medium", "plans-large", "plans-crowd"]
+    expected = suite.select_maps(tracks, [], quick=False)
     assert suite.select_maps(["plans", "plans-large"], [], quick=False) == expected
     with pytest.raises(ParameterError, match="unknown track 'plan'"):
         suite.select_maps(["plan"], [], quick=False)
@@ -102,10 +101,12 @@ def test_unknown_tracks_and_maps_are_rejected() -> None:
 
 
 def test_tracks_on_large_plans_have_each_plan_once() -> None:
-    tracks = [track for name, track in suite.TRACKS.items() if name.startswith("plans-")]
-    for track in tracks:
+    """The two tracks with the smallest teams have the same plans."""
+    tracks = {name: track for name, track in suite.TRACKS.items() if name.startswith("plans-")}
+    for track in tracks.values():
         assert [suite.FAMILY_OF[name] for name in track.maps] == list(LARGE_PLANS)
-    names = [name for track in tracks for name in track.maps]
+    assert tracks.pop("plans-one-robot").maps == tracks["plans-small"].maps
+    names = [name for track in tracks.values() for name in track.maps]
     assert sorted(names) == sorted(name for kind in LARGE_PLANS for name in suite.OTHER_FAMILIES[kind])
 
 
