@@ -116,7 +116,7 @@ def test_large_plans_have_a_ranking_of_their_own() -> None:
     assert "Overview of large plans" in overview
     first_row = re.findall(r"<tr>(.*?)</tr>", overview.partition("<tbody>")[2])[0]
     cells = re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", first_row)
-    assert (cells[2], cells[4]) == ("1", "24")
+    assert (cells[2], cells[4]) == ("1", "30")
 
 
 @pytest.mark.usefixtures("short_ideal_track")
@@ -143,7 +143,7 @@ def build_unfinished_atlas() -> dict[str, Any]:
 def test_unranked_entries_with_the_smallest_gap_are_named() -> None:
     """The oracle has even smaller gaps, but does not compete."""
     page = build_page([build_unfinished_atlas(), *select_bundled_results("rapf", "oracle")], "Test")
-    assert "have no rank: Atlas, shared maps (Plans small, Plans medium)." in page
+    assert "have no rank: Atlas, shared maps (Plans one robot, Plans small, Plans medium)." in page
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -155,7 +155,7 @@ def test_files_do_not_hide_bundled_entries_with_the_smallest_gap() -> None:
         row["gap"] = 0.0
     page = build_page([*results, forged], "Test")
     assert "Of the built-in controllers that do not know the whole map" in page
-    assert "have no rank: Atlas, shared maps (Plans small, Plans medium)." in page
+    assert "have no rank: Atlas, shared maps (Plans one robot, Plans small, Plans medium)." in page
 
 
 @pytest.mark.usefixtures("short_ideal_track", "without_plots")

@@ -106,7 +106,9 @@ def format_row(controller: str, track: str) -> str:
 
 RIVALS = ("rapf", "learned", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
+"""Tracks of large plans with more than one robot."""
 PLAN_CONTROLLERS = {
+    "plans-one-robot": ("frontier-median", "greedy-submodular", "local-search"),
     "plans-small": ("frontier-median", "greedy-submodular", "local-search"),
     "plans-medium": ("frontier-median", "greedy-submodular", "local-search", "exemplar"),
     "plans-large": ("frontier-median", "greedy-submodular", "voronoi-graph", "local-search", "exemplar"),
@@ -115,7 +117,8 @@ PLAN_CONTROLLERS = {
 """Controllers on each track of large plans, in addition to those on all of these tracks."""
 PLAN_ROWS = [
     *product(
-        ("atlas", "atlas-shared", "learned", "geodesic-lloyd", "tangentbug", "rapf", "lloyd"), PLAN_TRACKS
+        ("atlas", "atlas-shared", "learned", "geodesic-lloyd", "tangentbug", "rapf", "lloyd"),
+        suite.RANKED_TRACKS["plans"],
     ),
     *((controller, track) for track, names in PLAN_CONTROLLERS.items() for controller in names),
 ]
@@ -154,7 +157,8 @@ def test_the_best_controller_with_own_information_on_large_plans_agrees_with_the
     }
     text = read_text(PAGE)
     gaps_of_atlas = []
-    for track in PLAN_TRACKS:
+    tracks = suite.RANKED_TRACKS["plans"]
+    for track in tracks:
         gaps = {
             name: Rating(name, track, rows).gap.estimate
             for name, all_rows in results.items()
@@ -164,8 +168,29 @@ def test_the_best_controller_with_own_information_on_large_plans_agrees_with_the
         gaps_of_atlas.append(f"{100.0 * gaps['atlas']:.1f}%")
     *first_gaps, last_gap = gaps_of_atlas
     assert f"({', '.join(first_gaps)} and {last_gap})" in text
-    contacts = [row["contacts"] > 0 for row in results["tangentbug"] if row["track"] in PLAN_TRACKS]
+    contacts = [row["contacts"] > 0 for row in results["tangentbug"] if row["track"] in tracks]
     assert f"its robots touch something in {sum(contacts)} of {len(contacts)} runs" in text
+
+
+def test_gaps_of_one_and_three_robots_on_the_same_plans_agree_with_the_entries() -> None:
+    results = load_bundled_results()
+    gaps, path_lengths = {}, {}
+    for result, track in product(results, ("plans-one-robot", "plans-small")):
+        rows = [row for row in result["rows"] if row["track"] == track]
+        name = result["entry"]["controller"]
+        gaps[name, track] = np.median([row["gap"] for row in rows])
+        path_lengths[name, track] = np.median([row["path_length_m"] for row in rows])
+    names = [result["entry"]["controller"] for result in results]
+    larger_count = sum(gaps[name, "plans-small"] > gaps[name, "plans-one-robot"] for name in names)
+    text = read_text(PAGE)
+    assert f"With three robots, {larger_count} of {len(names)} controllers have larger gaps" in text
+    changes = [
+        f"from {gaps[name, 'plans-one-robot']:.1%} to {gaps[name, 'plans-small']:.1%}"
+        for name in ("atlas", "rapf")
+    ]
+    assert f"that of `atlas` grows {changes[0]}, that of `rapf` {changes[1]}" in text
+    lengths = [f"{path_lengths['atlas', track]:.1f}" for track in ("plans-one-robot", "plans-small")]
+    assert f"A single robot of `atlas` moves {lengths[0]} m, each of three {lengths[1]} m" in text
 
 
 def test_gaps_in_the_first_table_agree_with_the_entries() -> None:
@@ -322,7 +347,7 @@ def test_path_lengths_on_large_plans_agree_with_the_entries() -> None:
         ratios = [
             np.mean([row["path_length_m"] for row in read_rows(controller, track)])
             / np.mean([row["path_length_m"] for row in read_rows("oracle", track)])
-            for track in PLAN_TRACKS
+            for track in suite.RANKED_TRACKS["plans"]
         ]
         ranges.append(f"{min(ratios):.1f} to {max(ratios):.1f} times")
     text = read_text(PAGE)
@@ -406,14 +431,14 @@ def test_mean_gaps_with_an_unknown_density_agree_with_the_entries() -> None:
     assert f"has a mean gap of {means['atlas-shared']:.0%}, and of {worst:.0%} at most" in text
 
 
-def test_the_learned_policy_is_better_than_rapf_except_for_large_teams() -> None:
+def test_the_tracks_on_which_rapf_is_better_than_the_learned_policy_are_named() -> None:
     worse = []
     for track in suite.TRACKS:
         if not read_rows("learned", track):
             continue
         if compute_median_gap("learned", track) >= compute_median_gap("rapf", track):
             worse.append(suite.format_heading(track))
-    assert f"a smaller gap than `rapf` on all tracks except {', '.join(worse)}, but" in read_text(PAGE)
+    assert f"a smaller gap than `rapf` on all tracks except {' and '.join(worse)}, but" in read_text(PAGE)
 
 
 def test_the_table_of_coverage_control_has_the_rows_of_its_command() -> None:
@@ -524,7 +549,7 @@ def test_path_lengths_of_atlas_agree_with_the_entries() -> None:
     assert f"on the track Ideal is {lengths[0]:.1f} m, and {lengths[1]:.1f} m with `rapf`" in text
 
 
-@pytest.mark.parametrize("track", PLAN_TRACKS)
+@pytest.mark.parametrize("track", suite.RANKED_TRACKS["plans"])
 def test_the_worst_large_plans_agree_with_the_entries(track: str) -> None:
     cells = []
     for controller in ("atlas", "atlas-shared"):
@@ -656,7 +681,7 @@ def test_changes_by_the_gain_stake_agree_with_the_entries(track: str, controller
     assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("track", [*suite.RANKED_TRACKS["core"], *suite.RANKED_TRACKS["plans"]])
+@pytest.mark.parametrize("track", [*suite.RANKED_TRACKS["core"], *PLAN_TRACKS])
 def test_changes_of_frontier_median_agree_with_the_entries(track: str) -> None:
     cells = format_changes_on_track("visits", "frontier-median", track)
     row = f"| {suite.format_heading(track)} | {' | '.join(cells)} |"
