@@ -23,7 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from new_families import FAMILIES, SEEDS, build_maps, compute_hash
@@ -61,10 +61,10 @@ START_SEEDS = (0,)
 LARGE_GAP = 0.05
 REFERENCE_FILE = "references.json"
 RESULT_HEAD = (
-    "| track | controller | gap, % | maps above 5% | contacts | settled, % | path length, m |\n"
+    "| conditions | controller | gap, % | maps above 5% | contacts | settled, % | path length, m |\n"
     "|---|---|---|---|---|---|---|"
 )
-FAMILY_HEAD = f"| track | controller | {' | '.join(FAMILIES)} |\n{'|---' * (2 + len(FAMILIES))}|"
+FAMILY_HEAD = f"| conditions | controller | {' | '.join(FAMILIES)} |\n{'|---' * (2 + len(FAMILIES))}|"
 
 
 class Reference(NamedTuple):
@@ -138,7 +138,7 @@ def read_runs(study: Study, folder: Path, references: Mapping[str, Reference]) -
         entry = ledger.read_entry(task)
         if entry is None or entry.error is not None:
             raise SystemExit(f"{folder}: {task.name}: {'missing' if entry is None else entry.error}")
-        metrics = entry.metrics
+        metrics: Mapping[str, Any] = entry.metrics
         run = Run(
             map_name=task.map,
             gap=metrics["mean_distance_m"] / references[task.map].mean_distance - 1.0,

@@ -186,7 +186,8 @@ def cut_opening(ring: FloatArray, side: int, width: float) -> FloatArray:
     middle = (corners[-1] + corners[0]) / 2.0
     line = LineString([middle, *corners, middle])
     wall = substring(line, width / 2.0, line.length - width / 2.0)
-    return shapely.get_coordinates(wall)
+    points: FloatArray = shapely.get_coordinates(wall)
+    return points
 
 
 def find_opposite_angle(first: float, second: float) -> float:
@@ -202,7 +203,9 @@ def build_barrier(outer_ring: FloatArray, inner_ring: FloatArray, angle: float) 
     """Build a wall between two rings around the origin, in the given direction."""
     far_point = 2.0 * np.abs(outer_ring).max() * np.array([math.cos(angle), math.sin(angle)])
     ray = LineString([(0.0, 0.0), far_point])
-    return shapely.get_coordinates(ray.intersection(Polygon(outer_ring) - Polygon(inner_ring)))
+    barrier = ray.intersection(Polygon(outer_ring) - Polygon(inner_ring))
+    points: FloatArray = shapely.get_coordinates(barrier)
+    return points
 
 
 def draw_honeycomb(rng: np.random.Generator) -> FloorPlan:

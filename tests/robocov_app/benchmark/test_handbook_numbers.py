@@ -457,6 +457,30 @@ def test_the_table_of_coverage_control_has_the_rows_of_its_command() -> None:
     assert [mean for _, _, mean in rows] == sorted(mean for _, _, mean in rows)
 
 
+def test_the_tables_of_new_families_have_the_rows_of_their_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench_folder = Path(__file__).parents[2] / "bench"
+    monkeypatch.syspath_prepend(bench_folder)
+    script = runpy.run_path(str(bench_folder / "bench_new_families.py"))
+    maps = script["build_maps"]()
+    assert script["compute_hash"](maps) == script["MAPS_SHA256"]
+    expected_rows = [
+        (suite.format_heading(track), f"`{name}`")
+        for track, name in product(script["TRACKS"], script["CONTROLLERS"])
+    ]
+    text = PAGE.read_text(encoding="utf-8")
+    for head_name in ("RESULT_HEAD", "FAMILY_HEAD"):
+        _, head, body = text.partition(script[head_name] + "\n")
+        assert head
+        rows = [line.strip("| ").split(" | ") for line in body.partition("\n\n")[0].splitlines()]
+        # The page may leave out rows, but not change their order.
+        labels = [(row[0], row[1]) for row in rows]
+        assert labels
+        assert labels == [label for label in expected_rows if label in labels]
+        assert all(len(row) == head.splitlines()[0].count("|") - 1 for row in rows)
+        if head_name == "RESULT_HEAD":
+            assert all(row[3].endswith(f" of {len(maps)}") for row in rows)
+
+
 def test_the_effect_of_the_factors_of_the_score_agrees_with_the_entries(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
