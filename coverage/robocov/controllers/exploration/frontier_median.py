@@ -63,13 +63,13 @@ class FrontierMedian(SharedMapController):
     *Targets of others.* Robots out of communication range are assumed to be at their targets. Because this is
     uncertain, the robots in range share these targets when no other target has any utility left for them. A
     robot stays where it is if the targets of robots in range leave no utility for it; in the paper, it moves
-    to a target even then. With unlimited communication, this saves path length.
+    to a target even then. With unlimited communication, staying saves path length.
 
     *End of exploration.* A target is not visited again after a robot has been there. Only robots in range
     count, because robots out of range may never have arrived. A target is given up when robots in range have
     headed for it for longer than 3 s plus twice the time that the nearest of them needs at its maximum speed.
     Every exploration therefore comes to an end. Targets closer than 0.5 m to each other count as one.
-    Frontiers that only robots out of range could reach are not waited for.
+    Robots do not wait for frontiers that only robots out of range could reach.
     """
 
     name = "frontier-median"
@@ -95,8 +95,8 @@ class FrontierMedian(SharedMapController):
             return Placement(goals=self._compute_median(situation), is_final=True, visits=visits)
         targets = targets[is_reachable]
         path_lengths = path_lengths[:, is_reachable]
-        nobody = np.full(len(is_heard), _NO_TARGET)
-        assignment = self._assign_targets(situation, targets, path_lengths, nobody)
+        unassigned = np.full(len(is_heard), _NO_TARGET)
+        assignment = self._assign_targets(situation, targets, path_lengths, unassigned)
         # Robots out of range may never arrive: robots in range without a target share theirs.
         assignment[is_heard] = self._assign_targets(
             situation, targets, path_lengths[is_heard], assignment[is_heard]
@@ -203,7 +203,7 @@ class FrontierMedian(SharedMapController):
 
 
 def _stop_visits(situation: Situation) -> Visits:
-    """Return the visits after the time since the last plan.
+    """Return the visits of the last plan, updated by the time since then.
 
     The positions of robots out of range are only assumed, so their visits take no time and do not end.
     """

@@ -104,8 +104,8 @@ class Visits(NamedTuple):
         is_visitor : (k,) bool array
             Whether each robot heads for the target.
         limit : float, s
-            Time after which the target is given up, from the start of the earlier visit if there is one. A
-            longer limit of that visit stays.
+            Time for which robots may head for the target before it is given up, including the time of an
+            earlier visit. If the earlier visit has a longer limit, that limit stays.
 
         Returns
         -------

@@ -6,7 +6,7 @@ import numpy as np
 
 from robocov.controllers.exploration.visits import NO_VISIT, VISIT_RADIUS_M, Visits
 
-NOBODY_HAS_ARRIVED = np.zeros(2, dtype=bool)
+NO_ARRIVALS = np.zeros(2, dtype=bool)
 
 
 def start_visit() -> Visits:
@@ -35,21 +35,21 @@ def test_arrivals_of_robots_without_a_visit_do_not_count() -> None:
 def test_a_visit_is_over_when_its_time_has_passed() -> None:
     visits = start_visit()
     for _ in range(4):
-        visits = visits.stop(np.array([NO_VISIT, 0]), NOBODY_HAS_ARRIVED, time_spent=1.0)
+        visits = visits.stop(np.array([NO_VISIT, 0]), NO_ARRIVALS, time_spent=1.0)
     assert visits.is_over.tolist() == [False]
-    visits = visits.stop(np.array([NO_VISIT, 0]), NOBODY_HAS_ARRIVED, time_spent=1.0)
+    visits = visits.stop(np.array([NO_VISIT, 0]), NO_ARRIVALS, time_spent=1.0)
     assert visits.is_over.tolist() == [True]
 
 
 def test_the_time_of_robots_on_the_same_visit_counts_once() -> None:
-    visits = start_visit().stop(np.array([0, 0]), NOBODY_HAS_ARRIVED, time_spent=1.5)
+    visits = start_visit().stop(np.array([0, 0]), NO_ARRIVALS, time_spent=1.5)
     assert visits.durations.tolist() == [1.5]
 
 
 def test_a_target_close_to_an_earlier_one_continues_the_visit() -> None:
     """Otherwise, targets that shift a little would never be given up."""
     visits = start_visit()
-    visits = visits.stop(visits.current, NOBODY_HAS_ARRIVED, time_spent=3.0)
+    visits = visits.stop(visits.current, NO_ARRIVALS, time_spent=3.0)
     visits = visits.start(np.array([1.2, 1.0]), np.array([True, False]), limit=2.0)
     assert visits.positions.tolist() == [[1.0, 1.0]]
     assert visits.current.tolist() == [0, NO_VISIT]
