@@ -203,6 +203,13 @@ def test_sliders_of_whole_numbers_have_only_whole_numbers(name):
                 assert parameter.compute_value(position) == parameter.low + 1.0
 
 
+def test_the_slider_of_a_whole_number_reaches_a_minimum_of_zero():
+    parameters = list_gain_parameters(ControllerChoice("boosting"))
+    boosts = next(parameter for parameter in parameters if parameter.name == "boosts")
+    assert boosts.compute_value(0.0) == 0.0
+    assert boosts.compute_value(boosts.slider_step) == 1.0
+
+
 def test_large_whole_numbers_are_shown_in_full():
     parameters = list_gain_parameters(ControllerChoice("poduri", {"neighbors": 100.0}))
     neighbors = next(parameter for parameter in parameters if parameter.name == "neighbors")

@@ -173,7 +173,7 @@ class NumberParameter:
 
     @property
     def slider_step(self) -> float:
-        """Distance of the possible positions of the slider; 0 if any position is possible."""
+        """Distance between the possible positions of the slider; 0 if any position is possible."""
         if self.is_whole and 0.0 < self.high - self.low <= MAX_STEPS:
             return 1.0 / (self.high - self.low)
         return 0.0
@@ -347,7 +347,8 @@ def _build_gain_parameter(
     low = max(gain.low, lowest)
     high = min(gain.high, SLIDER_SPAN * abs(reference_value))
     if gain.whole:
-        low = float(math.ceil(low))
+        # Rounded down, so that the slider reaches a minimum of 0.
+        low = float(max(math.ceil(gain.low), math.floor(low)))
         high = float(math.floor(high))
     return NumberParameter(
         name=name,
