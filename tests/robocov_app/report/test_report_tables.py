@@ -144,7 +144,7 @@ def test_many_sets_of_gains_are_summarized_as_ranges_and_listed() -> None:
     assert len(get_column(build_gain_sets_table(result), "Gains")) == 19
 
 
-def test_the_ends_of_a_narrow_range_of_gains_can_be_told_apart() -> None:
+def test_the_ends_of_a_narrow_range_of_gains_differ() -> None:
     runs = [build_run(gains=(("k_rep", 0.3 + 0.000001 * number),)) for number in range(20)]
     table = build_controllers_table(build_result(runs, gain_units={"k_rep": "N m³"}))
     assert table.rows == [("RAPF", "rapf", "k_rep 0.3 to 0.300019 N m³")]

@@ -289,7 +289,7 @@ def test_the_message_says_that_the_process_of_a_run_was_killed(
     assert not target.exists()
 
 
-def test_the_user_is_told_of_a_run_that_is_still_being_saved_after_the_first_one(
+def test_a_run_that_is_still_being_saved_after_the_first_one_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start_process = subprocess.Popen

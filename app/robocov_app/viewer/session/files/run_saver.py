@@ -122,13 +122,13 @@ class RunSaver:
     def finish(self) -> None:
         """Wait until all runs are saved; if the wait is interrupted, kill the processes."""
         try:
-            has_told_user = False
+            is_reported = False
             for job in self._jobs:
                 with suppress(subprocess.TimeoutExpired):
                     job.process.wait(FIRST_WAIT_S)
-                if not has_told_user and job.process.poll() is None:
+                if not is_reported and job.process.poll() is None:
                     echo("saving runs; press Ctrl+C to cancel", to_stderr=True)
-                    has_told_user = True
+                    is_reported = True
                 job.process.wait()
         except BaseException:
             for job in self._jobs:
