@@ -183,7 +183,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     ParameterError
         If a parameter is out of range.
     NoLayoutError
-        If no layout is found that meets all requirements. It is a ParameterError.
+        If no layout is found that meets all requirements. This is a subclass of ParameterError.
 
     See Also
     --------

@@ -412,10 +412,10 @@ class Record(Drawable):
         OutputError
             If the folder or a file cannot be written.
         ValueError
-            If the summary contains a number that JSON does not have. Nothing is written then.
+            If the summary contains a number that JSON cannot represent. Nothing is written then.
         """
         folder = Path(folder)
-        # A summary that JSON cannot contain raises an error here, before any file is replaced.
+        # A summary that JSON cannot represent raises an error here, before any file is replaced.
         text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
         complete_commit(folder)
         try:

@@ -133,7 +133,7 @@ class Recorder:
             label=to_one_line(self.controller.label),
             gains=self._gains,
             start=self.start,
-            # JSON has no numbers of NumPy.
+            # The JSON encoder rejects NumPy integers.
             seed=None if self.seed is None else int(self.seed),
             dt=self.dt,
             time=np.array(self._times),
