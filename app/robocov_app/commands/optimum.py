@@ -150,7 +150,7 @@ def _build_problem(options: Arguments) -> _Problem:
 
 
 def _check_run(saved: SavedRun, first: SavedRun) -> None:
-    """Raise InputError if team or map change during a run, or if the first run has another team size."""
+    """Raise InputError if the team or map changes during a run, or the first run has another team size."""
     record = saved.record
     if not has_constant_setting(record):
         raise InputError(
@@ -291,7 +291,7 @@ def _describe_search(best: Optimum, robots: int, seconds: float) -> list[str]:
 
 def _describe_gap(gap: dict[str, Any]) -> str:
     """Return the gap of a run as a line of text."""
-    comparison = "no gap: covers other parts of the map than the best placement"
+    comparison = "no gap: covers different parts of the map from the best placement"
     if gap["gap"] is not None:
         comparison = f"gap {gap['gap']:.1%}"
     return f"{gap['run']}: mean distance {gap['mean_distance_m']:.4f} m, {comparison}"

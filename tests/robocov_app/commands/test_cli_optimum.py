@@ -122,7 +122,7 @@ def test_a_run_that_covers_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest
     assert row["uncovered_area_m2"] == 0.0
     assert row["runs"][0]["gap"] is None
     assert main(["optimum", "--run", str(out), *FAST]) == 0
-    assert "covers other parts of the map than the best placement" in capsys.readouterr().out
+    assert "covers different parts of the map from the best placement" in capsys.readouterr().out
 
 
 @pytest.mark.slow
