@@ -155,7 +155,9 @@ TRACKS: Mapping[str, Track] = {
     "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
-    "plans-one-robot": Track("large plans, one robot", _PLANS[0], robots=1, duration=240.0, ranking="plans"),
+    "plans-one-robot": Track(
+        "large plans, the same as those of plans-small", _PLANS[0], robots=1, duration=240.0, ranking="plans"
+    ),
     "plans-small": Track(
         "large plans, unlimited communication", _PLANS[0], robots=3, duration=240.0, ranking="plans"
     ),
