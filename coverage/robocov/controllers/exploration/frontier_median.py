@@ -89,17 +89,17 @@ class FrontierMedian(SharedMapController):
         targets = self._find_targets(situation, visits)
         path_lengths = self._compute_path_lengths(situation, targets)
         # Robots out of range may not be where they are assumed to be: do not wait for them.
-        is_heard = situation.group.is_heard
-        is_reachable = np.isfinite(path_lengths[is_heard]).any(axis=0)
+        is_in_range = situation.group.is_in_range
+        is_reachable = np.isfinite(path_lengths[is_in_range]).any(axis=0)
         if not is_reachable.any():
             return Placement(goals=self._compute_median(situation), is_final=True, visits=visits)
         targets = targets[is_reachable]
         path_lengths = path_lengths[:, is_reachable]
-        unassigned = np.full(len(is_heard), _NO_TARGET)
+        unassigned = np.full(len(is_in_range), _NO_TARGET)
         assignment = self._assign_targets(situation, targets, path_lengths, unassigned)
         # Robots out of range may never arrive: robots in range without a target share theirs.
-        assignment[is_heard] = self._assign_targets(
-            situation, targets, path_lengths[is_heard], assignment[is_heard]
+        assignment[is_in_range] = self._assign_targets(
+            situation, targets, path_lengths[is_in_range], assignment[is_in_range]
         )
         goals = np.where((assignment == _NO_TARGET)[:, None], situation.positions, targets[assignment])
         visits = _start_visits(situation, visits, targets, path_lengths, assignment)
@@ -213,9 +213,9 @@ def _stop_visits(situation: Situation) -> Visits:
         return Visits.build_empty(len(group.robots))
     visits = previous_plan.placement.visits
     robots_on_visit = np.full(len(group.robots), NO_VISIT)
-    rows, previous_rows = situation.match_robots(previous_plan)
+    rows, previous_rows = group.match(previous_plan.group)
     robots_on_visit[rows] = visits.current[previous_rows]
-    robots_on_visit[~group.is_heard] = NO_VISIT
+    robots_on_visit[~group.is_in_range] = NO_VISIT
     distances = np.sqrt(((situation.positions - situation.previous_goals) ** 2).sum(axis=1))
     return visits.stop(
         robots_on_visit,
@@ -231,10 +231,10 @@ def _start_visits(
 
     The arrays are those of `FrontierMedian._assign_targets`.
     """
-    is_visiting = situation.group.is_heard & (assignment != _NO_TARGET)
+    is_visiting = situation.group.is_in_range & (assignment != _NO_TARGET)
     for target in np.unique(assignment[is_visiting]):
         is_visitor = is_visiting & (assignment == target)
-        travel_time = path_lengths[is_visitor, target].min() / situation.body.max_speed
+        travel_time = path_lengths[is_visitor, target].min() / situation.limits.max_speed
         limit = _WAITING_TIME_S + _TRAVEL_TIME_FACTOR * travel_time
         visits = visits.start(targets[target], is_visitor, limit)
     return visits
@@ -243,7 +243,7 @@ def _start_visits(
 def _compute_utility_losses(situation: Situation, targets: FloatArray, target: int) -> FloatArray:
     """Return by how much the utility of each of t targets decreases if a robot visits one of them, (t,)."""
     planner = situation.planner
-    sensing_range = situation.body.sensing_range
+    sensing_range = situation.limits.sensing_range
     distances = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
     is_clear = planner.visibility.find_clear_lines(targets[target], targets, planner.map_window.is_blocked)
     is_in_view = (distances < sensing_range) & is_clear

@@ -60,8 +60,9 @@ class GreedySubmodular(SharedMapController):
         if len(candidates.positions) < count:
             return Placement(goals=situation.positions, is_final=False)
         chosen = run_lloyd(candidates.table, choose_greedily(candidates.table, count))
-        if np.isfinite(situation.previous_goals).all():
-            previous = run_lloyd(candidates.table, candidates.assign_to_positions(situation.previous_goals))
+        previous_goals = situation.previous_goals
+        if np.isfinite(previous_goals).all():
+            previous = run_lloyd(candidates.table, candidates.assign_to_positions(previous_goals))
             max_cost = (1.0 - self.threshold) * candidates.compute_cost(previous)
             if not candidates.compute_cost(chosen) < max_cost:
                 chosen = previous

@@ -58,13 +58,28 @@ class Group(NamedTuple):
         return float(self.message_times.max())
 
     @property
-    def is_heard(self) -> BoolArray:
+    def is_in_range(self) -> BoolArray:
         """Whether the position of each robot is known at present rather than assumed, (k,)."""
         return np.asarray(self.message_times == self.time)
 
+    def match(self, other: Group) -> tuple[IntArray, IntArray]:
+        """Find the robots that are in both of two groups.
 
-class Body(NamedTuple):
-    """The parameters of a robot that matter for its plans."""
+        Parameters
+        ----------
+        other : Group
+
+        Returns
+        -------
+        rows, other_rows : (j,) int arrays
+            Index of each of these robots in this group and in the other one.
+        """
+        _, rows, other_rows = np.intersect1d(self.robots, other.robots, return_indices=True)
+        return rows, other_rows
+
+
+class RobotLimits(NamedTuple):
+    """Limits of a robot that matter for its plans."""
 
     radius: float
     """m."""
@@ -111,8 +126,8 @@ class Situation(NamedTuple):
     known_map: DiscoveredMap
     planner: GridPlanner
     density: Density | None
-    body: Body
-    """The body of the robot that plans."""
+    limits: RobotLimits
+    """Limits of the robot that plans."""
 
     @property
     def positions(self) -> FloatArray:
@@ -124,24 +139,9 @@ class Situation(NamedTuple):
         """Goals of the robots in the last plan, (k, 2) m; nan for robots without one."""
         goals = np.full(self.positions.shape, np.nan)
         if self.previous_plan is not None:
-            rows, previous_rows = self.match_robots(self.previous_plan)
+            rows, previous_rows = self.group.match(self.previous_plan.group)
             goals[rows] = self.previous_plan.placement.goals[previous_rows]
         return goals
-
-    def match_robots(self, plan: Plan) -> tuple[IntArray, IntArray]:
-        """Find the robots that are also in the group of a plan.
-
-        Parameters
-        ----------
-        plan : Plan
-
-        Returns
-        -------
-        rows, plan_rows : (j,) int arrays
-            Index of each of these robots in this group and in that of the plan.
-        """
-        _, rows, plan_rows = np.intersect1d(self.group.robots, plan.group.robots, return_indices=True)
-        return rows, plan_rows
 
     def compute_weights(self, is_counted: BoolArray) -> FloatArray:
         """Compute the weights of the nodes of the planner.
@@ -416,15 +416,15 @@ class SharedMapController(BaseController):
         for robot, previous_plan in enumerate(memory.plans):
             known_map = memory.maps[robot]
             group = _build_group(seen, memory.team, previous_plan, robot)
-            body = Body(
+            limits = RobotLimits(
                 radius=float(memory.team.radius[robot]),
                 max_speed=float(memory.team.max_speed[robot]),
                 sensing_range=float(memory.team.sensing_range[robot]),
             )
             arrays = tuple(column.tobytes() for column in group)
-            key = (id(known_map), id(previous_plan), body, *arrays)
+            key = (id(known_map), id(previous_plan), limits, *arrays)
             if key not in plans_by_knowledge:
-                plans_by_knowledge[key] = self._make_plan(seen, known_map, previous_plan, group, body)
+                plans_by_knowledge[key] = self._make_plan(seen, known_map, previous_plan, group, limits)
             plans.append(plans_by_knowledge[key])
         return tuple(plans)
 
@@ -434,7 +434,7 @@ class SharedMapController(BaseController):
         known_map: DiscoveredMap,
         previous_plan: Plan | None,
         group: Group,
-        body: Body,
+        limits: RobotLimits,
     ) -> Plan:
         """Return the plan of a robot for its group.
 
@@ -444,7 +444,7 @@ class SharedMapController(BaseController):
             return replace(previous_plan, group=group)
         window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
         if previous_plan is None:
-            planner = GridPlanner(known_map, window, body.radius + self.clearance)
+            planner = GridPlanner(known_map, window, limits.radius + self.clearance)
         else:
             planner = previous_plan.planner
         planner = planner.update(known_map, window)
@@ -454,7 +454,7 @@ class SharedMapController(BaseController):
             known_map=known_map,
             planner=planner,
             density=seen.density,
-            body=body,
+            limits=limits,
         )
         return Plan(
             group=group,

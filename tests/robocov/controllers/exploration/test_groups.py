@@ -8,10 +8,10 @@ from planning_cases import REGION, build_map, build_planner
 
 from robocov.controllers.exploration.shared_map import (
     MAX_SILENCE_S,
-    Body,
     Group,
     Placement,
     Plan,
+    RobotLimits,
     Situation,
     _build_group,
     assign_goals,
@@ -31,7 +31,7 @@ def test_goals_are_assigned_by_squared_path_lengths() -> None:
         known_map=build_map(),
         planner=build_planner(),
         density=None,
-        body=Body(radius=0.1, max_speed=1.0, sensing_range=3.0),
+        limits=RobotLimits(radius=0.1, max_speed=1.0, sensing_range=3.0),
     )
     np.testing.assert_array_equal(assign_goals(situation, goals), goals[[1, 0]])
 

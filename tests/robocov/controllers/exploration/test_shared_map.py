@@ -14,11 +14,11 @@ from robocov.controllers.exploration.frontier_median import FrontierMedian
 from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.scan_exchange import ScanExchange
 from robocov.controllers.exploration.shared_map import (
-    Body,
     Candidates,
     Group,
     Placement,
     Plan,
+    RobotLimits,
     Situation,
     assign_goals,
 )
@@ -71,7 +71,7 @@ def build_situation(state: np.ndarray, positions: list[list[float]]) -> Situatio
         known_map=known_map,
         planner=GridPlanner(known_map, window, 0.13),
         density=None,
-        body=Body(radius=0.1, max_speed=1.0, sensing_range=3.0),
+        limits=RobotLimits(radius=0.1, max_speed=1.0, sensing_range=3.0),
     )
 
 
