@@ -70,6 +70,9 @@ class FrontierMedian(SharedMapController):
     headed for it for longer than 3 s plus twice the time that the nearest of them needs at its maximum speed.
     Every exploration therefore comes to an end. Targets closer than 0.5 m to each other count as one.
     Robots do not wait for frontiers that only robots out of range could reach.
+
+    Robots do not tell each other which targets they have visited, so their plans can differ. With a limited
+    communication range, they may leave the last targets to each other until the time for these is over.
     """
 
     name = "frontier-median"
