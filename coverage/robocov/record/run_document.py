@@ -51,7 +51,7 @@ def _build_number_field(minimum: float, maximum: float, *, allow_null: bool, is_
 
 
 def _build_conditions_model() -> Any:
-    """Build the model of conditions, whose numbers have the ranges in `PARAMETERS`."""
+    """Build the pydantic model of `Conditions`. `PARAMETERS` gives the ranges of its numbers."""
     fields: dict[str, Any] = {
         "failures": (list[_Failure], ...),
         "joins": (list[_Join], ...),

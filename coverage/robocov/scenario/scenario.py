@@ -15,7 +15,6 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from robocov.conditions import PARAMETERS as CONDITION_PARAMETERS
 from robocov.conditions import Conditions
 from robocov.controllers import (
     CONTROLLERS,
@@ -47,7 +46,7 @@ from robocov.files.strictjson import parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov.mapfile import find_map_file, from_json, list_bundled_maps, load_map, to_json
 from robocov.record import Record, Recorder
-from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ConditionsEntry, ScenarioDocument
+from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ScenarioDocument
 from robocov.simulation import Simulation, TeamState, check_dt, check_joins
 from robocov.team import PARAMETERS, Team
 from robocov.typing import FloatArray
@@ -519,14 +518,17 @@ class Scenario:
             If the document cannot be used. The message names the document and the value.
         """
         check_header(document, source_name, FORMAT, FORMAT_VERSION)
-        content = validate_document(document, source_name, ScenarioDocument)
-        name = content.controller.name
-        if name not in CONTROLLERS and name not in controllers:
-            raise InputError(
-                f"{source_name}: controller.name: expected a built-in controller, got {quote(name)}; "
-                "a file does not run code unless the user also names the controller"
-            )
         try:
+            content = validate_document(document, source_name, ScenarioDocument)
+            name = content.controller.name
+            if name not in CONTROLLERS and name not in controllers:
+                raise InputError(
+                    f"{source_name}: controller.name: expected a built-in controller, got {quote(name)}; "
+                    "a file does not run code unless the user also names the controller"
+                )
+            conditions = None
+            if content.conditions is not None:
+                conditions = Conditions.from_dict(content.conditions.model_dump())
             scenario = cls(
                 _load_environment(content.map, source_name, folder),
                 name,
@@ -539,7 +541,7 @@ class Scenario:
                 steering=content.start_steering,
                 duration=content.duration_s,
                 dt=content.dt_s,
-                conditions=_read_conditions(content.conditions, source_name),
+                conditions=conditions,
             )
         except (ParameterError, StartError) as error:
             raise InputError(f"{source_name}: {error}") from error
@@ -734,18 +736,3 @@ def _read_team(content: Mapping[str, Any]) -> Team:
         if key not in keys:
             raise ParameterError(f"team: {describe_unknown_name('key', key, keys)}")
     return Team.from_dict({**Team.homogeneous(DEFAULT_ROBOTS).to_dict(), **content})
-
-
-def _read_conditions(content: Mapping[str, Any] | None, source_name: str) -> Conditions | None:
-    """Return the conditions of a document, in which every key may be missing."""
-    if content is None:
-        return None
-    # `Conditions.to_dict` leaves out the bandwidth and the density if they have no effect.
-    keys = [parameter.json_key for parameter in CONDITION_PARAMETERS.values()]
-    keys += ["failures", "joins", "seed", "density"]
-    for key in content:
-        if key not in keys:
-            raise ParameterError(f"conditions: {describe_unknown_name('key', key, keys)}")
-    document = {**Conditions().to_dict(), **content}
-    validate_document({"conditions": document}, source_name, ConditionsEntry)
-    return Conditions.from_dict(document)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
+from robocov.conditions import Conditions
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_S
+from robocov.errors import ParameterError, describe_unknown_name
 from robocov.files.documents import Document, expect
 from robocov.record.run_document import ConditionsDocument, Point, Seconds, Seed, Time
 
@@ -25,10 +27,17 @@ class ControllerEntry(Document):
     gains: dict[str, Annotated[float | str | bool | None, expect("a number, a word or null")]] = Field({})
 
 
-class ConditionsEntry(Document):
-    """The conditions of a scenario, after missing keys have received their defaults."""
-
-    conditions: ConditionsDocument
+def _fill_conditions(content: Any) -> Any:
+    """Add the defaults of missing keys to conditions; raise ParameterError if a key is unknown."""
+    if not isinstance(content, dict):
+        return content
+    for key in content:
+        if key not in ConditionsDocument.model_fields:
+            # This is no ValueError, so pydantic passes it on unchanged.
+            raise ParameterError(
+                f"conditions: {describe_unknown_name('key', key, ConditionsDocument.model_fields)}"
+            )
+    return {**Conditions().to_dict(), **content}
 
 
 class ScenarioDocument(Document):
@@ -52,4 +61,4 @@ class ScenarioDocument(Document):
     start_steering: Annotated[list[Point] | None, expect("a list of [heading, turning rate], or null")] = None
     duration_s: Time = DEFAULT_DURATION_S
     dt_s: Seconds = DEFAULT_DT_S
-    conditions: dict[str, Any] | None = None
+    conditions: Annotated[ConditionsDocument | None, BeforeValidator(_fill_conditions)] = None
