@@ -27,6 +27,8 @@ from robocov.text import escape_controls
 if TYPE_CHECKING:
     from robocov.typing import FloatArray
 
+MAX_SEED = 2**63 - 1
+"""Maximum seed of a run, which fits in a signed integer of 64 bits."""
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices that lead to a value, from the outermost object inwards."""
 _MIN_WHOLE_AREA_M2 = 1000.0
@@ -498,7 +500,7 @@ def to_floats(
         raise error_type(_describe_mismatch(name, values, expected)) from None
 
 
-def require_seed(name: str, value: object) -> None:
+def require_seed(name: str, value: object, error_type: type[InputError] = ParameterError) -> None:
     """Raise an error unless a value is a seed of random numbers.
 
     Parameters
@@ -507,14 +509,16 @@ def require_seed(name: str, value: object) -> None:
         Name of the parameter in the message.
     value : object
         The value to check.
+    error_type : type
+        Class of the error to raise.
 
     Raises
     ------
-    ParameterError
-        If it is not a whole number of at least 0.
+    InputError
+        Of type `error_type`, if the value is not a whole number of at least 0.
     """
     if not is_number(value, Integral) or value < 0:
-        raise ParameterError(f"{name}: expected a whole number of at least 0, got {quote(value)}")
+        raise error_type(f"{name}: expected a whole number of at least 0, got {quote(value)}")
 
 
 def require_type(name: str, value: object, kind: type, expected: str) -> None:

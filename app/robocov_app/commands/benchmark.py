@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, format_count, require_number
+from robocov.errors import MAX_SEED, InputError, ParameterError, format_count, require_number
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -104,7 +104,7 @@ class Arguments(JsonOption):
         require_number("--robots", self.robots, 0, 1_000_000, whole=True)
         require_number("--new-maps", self.new_maps, 0, 1_000_000, whole=True)
         if self.seed is not None:
-            require_number("--seed", self.seed, 0, 2**63 - 1, whole=True)
+            require_number("--seed", self.seed, 0, MAX_SEED, whole=True)
         self._check_applicable_options()
         if self.action == "run" and self.controller is None:
             raise ParameterError("--controller: expected a controller name or FILE.py:CLASS, got none")

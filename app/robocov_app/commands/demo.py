@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import ParameterError, StartError, require_number
+from robocov.errors import MAX_SEED, ParameterError, StartError, require_number
 from robocov_app.commands.options import LayerOptions, ScenarioOptions, WindowOptions, get_robot_count
 from robocov_app.runs.settings import MIN_LATTICE
 from robocov_app.terminal.arguments import parse_gains, parse_window_size
@@ -72,7 +72,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
         """Check that the options are in range and do not contradict each other."""
         super().__post_init__()
         require_number("--robots", self.robots, 1, 1000)
-        require_number("--seed", self.seed, 0, 2**63 - 1)
+        require_number("--seed", self.seed, 0, MAX_SEED)
         require_number("--lattice", self.lattice, MIN_LATTICE, _MAX_WINDOW_LATTICE)
         require_number("--speed", self.speed, 0.01, 1000.0)
         if self.frames is not None:

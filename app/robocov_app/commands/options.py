@@ -22,7 +22,7 @@ from robocov.defaults import (
     DEFAULT_TURNING_RATE_RAD_S,
     DEFAULT_VISCOSITY_N_S_M,
 )
-from robocov.errors import ParameterError, require_number
+from robocov.errors import MAX_SEED, ParameterError, require_number
 from robocov.files.result_folder import describe_path
 from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.arguments import parse_size, parse_window_size
@@ -341,7 +341,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         if self.team is not None:
             self.robots = get_robot_count(self.build_team(), self.robots, RunOptions.robots, self.team)
         require_number("--robots", self.robots, 1, 10_000)
-        require_number("--seed", self.seed, 0, 2**63 - 1)
+        require_number("--seed", self.seed, 0, MAX_SEED)
         require_number("--duration", self.duration, 0.0, 1e6, "s")
         require_number("--lattice", self.lattice, MIN_LATTICE, MAX_LATTICE)
         self._check_record_size()

@@ -21,7 +21,15 @@ from robocov.environment.packing import (
     pack_lattice,
     pack_randomly,
 )
-from robocov.errors import StartError, format_count, format_position, is_number, quote, require_number
+from robocov.errors import (
+    StartError,
+    format_count,
+    format_position,
+    is_number,
+    quote,
+    require_number,
+    require_seed,
+)
 from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray, Point
 
@@ -174,8 +182,9 @@ class Start:
         >>> Start("corner", DiscStart((1.0, 1.0), 0.8), square).sample(6, seed=3).shape
         (6, 2)
         """
-        self._require_whole_number("robots", n, 1)
-        self._require_whole_number("seed", seed, 0)
+        if not is_number(n, Integral) or n < 1:
+            raise self._build_error(f"robots: expected a whole number of at least 1, got {quote(n)}")
+        require_seed(f"start {self.name!r}: seed", seed, StartError)
         self._require_radius(radius)
         if isinstance(self.spec, PointsStart):
             return self._take_given_positions(n, radius, self.spec.positions)
@@ -244,12 +253,6 @@ class Start:
             area = area.intersection(center.buffer(self.spec.radius, quad_segs=_DISC_QUADRANT_SEGMENTS))
         # A disc that only touches the area gives a point or a line, in which no position can be sampled.
         return area if area.area > 0.0 else shapely.Polygon()
-
-    def _require_whole_number(self, name: str, value: object, minimum: int) -> None:
-        if not is_number(value, Integral) or value < minimum:
-            raise self._build_error(
-                f"{name}: expected a whole number of at least {minimum}, got {quote(value)}"
-            )
 
     def _require_radius(self, radius: object) -> None:
         limits = TEAM_PARAMETERS["radius"]

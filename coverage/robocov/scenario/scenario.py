@@ -29,6 +29,7 @@ from robocov.controllers.user_modules import ControllerSource, provide_modules
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_S, DEFAULT_ROBOTS
 from robocov.environment import Environment
 from robocov.errors import (
+    MAX_SEED,
     InputError,
     MapError,
     ParameterError,
@@ -55,8 +56,6 @@ MAX_RECORD_ROWS = 2e7
 """Maximum number of recorded steps times the number of robots: about 2 GB."""
 MAX_DURATION_S = 1e6
 """Maximum simulated time of a run."""
-MAX_SEED = 2**63 - 1
-"""Maximum seed."""
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)

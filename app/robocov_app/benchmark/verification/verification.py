@@ -30,7 +30,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.errors import InputError, format_count
+from robocov.errors import MAX_SEED, InputError, format_count
 from robocov.kernel_compilation import ALL_EXAMPLES, compile_kernels
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
@@ -63,8 +63,6 @@ from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption
 
-MAX_SEED = 2**63 - 1
-"""Maximum seed, which fits in a signed integer of 64 bits."""
 TrackRunKey: TypeAlias = tuple[str, str, int]
 """Track (or `NEW_MAP`), map and seed of a run."""
 NEW_MAP = "new map"

@@ -8,15 +8,13 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from robocov.errors import ParameterError, describe_unknown_name, require_number
+from robocov.errors import MAX_SEED, ParameterError, describe_unknown_name, require_number
 from robocov.typing import FloatArray
 
 Scale: TypeAlias = Literal["linear", "log"]
 SamplingMethod: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 MAX_SAMPLES = 100_000
 """Maximum number of samples."""
-MAX_SEED = 2**63 - 1
-"""Maximum seed."""
 _SAMPLE_DIGITS = 6
 """Number of significant digits of a sampled gain; further digits could differ between processors."""
 

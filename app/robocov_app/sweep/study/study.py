@@ -26,6 +26,7 @@ from robocov.defaults import (
 )
 from robocov.environment import Environment
 from robocov.errors import (
+    MAX_SEED,
     InputError,
     ParameterError,
     describe_unknown_name,
@@ -52,7 +53,7 @@ from robocov_app.sweep.study.parameters import (
     parse_condition_axes,
     parse_parameter,
 )
-from robocov_app.sweep.study.sampling import MAX_SEED, Sampling
+from robocov_app.sweep.study.sampling import Sampling
 from robocov_app.sweep.study.study_size import DEFAULT_MAX_RUNS, MAX_MAX_RUNS, count_values, require_few_runs
 from robocov_app.sweep.study.value_paths import parse_values, require_distinct
 
