@@ -26,6 +26,7 @@ from robocov.defaults import (
     DEFAULT_VISCOSITY_N_S_M,
 )
 from robocov.errors import (
+    InputError,
     ParameterError,
     describe_unknown_name,
     format_bound,
@@ -33,6 +34,7 @@ from robocov.errors import (
     is_number,
     quote,
     quote_json,
+    require_number,
     to_floats,
 )
 from robocov.typing import BoolArray, FloatArray, IntArray
@@ -84,6 +86,29 @@ class TeamParameter(NamedTuple):
         """
         text = f"a number from {format_bound(self.minimum)} to {format_bound(self.maximum)}"
         return f"{text} or {infinity}" if self.may_be_infinite else text
+
+    def require(self, name: str, value: object, error_type: type[InputError] = ParameterError) -> float:
+        """Return a finite value as a float, or raise an error unless it is a number in the range.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter in the message.
+        value : object
+            The value to check.
+        error_type : type
+            Class of the error to raise.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        InputError
+            Of type `error_type`, if the value is not a number in the range.
+        """
+        return require_number(name, value, self.minimum, self.maximum, self.unit, error_type=error_type)
 
 
 PARAMETERS: dict[str, TeamParameter] = {

@@ -21,15 +21,7 @@ from robocov.environment.packing import (
     pack_lattice,
     pack_randomly,
 )
-from robocov.errors import (
-    StartError,
-    format_count,
-    format_position,
-    is_number,
-    quote,
-    require_number,
-    require_seed,
-)
+from robocov.errors import StartError, format_count, format_position, is_number, quote, require_seed
 from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray, Point
 
@@ -255,9 +247,7 @@ class Start:
         return area if area.area > 0.0 else shapely.Polygon()
 
     def _require_radius(self, radius: object) -> None:
-        limits = TEAM_PARAMETERS["radius"]
-        name = f"start {self.name!r}: radius"
-        require_number(name, radius, limits.minimum, limits.maximum, limits.unit, error_type=StartError)
+        TEAM_PARAMETERS["radius"].require(f"start {self.name!r}: radius", radius, StartError)
 
     def _describe_lack_of_space(self, n: int, radius: float) -> str:
         capacity = self.estimate_capacity(radius)

@@ -32,7 +32,6 @@ from robocov.errors import (
     format_count,
     format_path,
     format_position,
-    require_number,
     summarize_names,
 )
 from robocov.team import PARAMETERS as TEAM_PARAMETERS
@@ -198,8 +197,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     100.0
     """
     require_environment(environment)
-    limits = TEAM_PARAMETERS["radius"]
-    require_number("radius", radius, limits.minimum, limits.maximum, limits.unit)
+    TEAM_PARAMETERS["radius"].require("radius", radius)
     gap = find_narrowest_gap(environment.free)
     density = environment.density
     density_kind = None

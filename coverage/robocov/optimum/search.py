@@ -255,8 +255,7 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
     require_number("robots", robots, 1, MAX_ROBOTS, whole=True)
     require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
     require_seed("seed", seed)
-    limits = TEAM_PARAMETERS["radius"]
-    require_number("radius", radius, limits.minimum, limits.maximum, limits.unit)
+    TEAM_PARAMETERS["radius"].require("radius", radius)
 
 
 def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
