@@ -749,6 +749,27 @@ def format_bound(bound: float) -> str:
     return f"{Decimal(text):f}"
 
 
+def format_exactly(value: float) -> str:
+    """Format a number with as many digits as are needed to read the same number again.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+        ``inf`` for infinity.
+
+    Examples
+    --------
+    >>> format_exactly(2.0), format_exactly(0.30000000000000004)
+    ('2', '0.30000000000000004')
+    """
+    text = f"{value:g}"
+    return text if float(text) == value else repr(float(value))
+
+
 def _shorten(text: str) -> str:
     """Cut a text that is longer than `_MAX_QUOTED_CHARACTERS`, and mark the cut by three dots."""
     if len(text) <= _MAX_QUOTED_CHARACTERS:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from numbers import Integral
 from typing import Any, NamedTuple, TypeVar
 
-from robocov.errors import ParameterError, format_bound, is_number, quote
+from robocov.errors import ParameterError, format_bound, format_exactly, is_number, quote
 
 MAX_TIME_S = 1e6
 """Latest time of an event."""
@@ -47,7 +47,7 @@ class Failure(NamedTuple):
 
     def __str__(self) -> str:
         """Return the text from which `parse_event` builds an equal event."""
-        return f"{self.robot}@{_format_exactly(self.time)}"
+        return f"{self.robot}@{format_exactly(self.time)}"
 
 
 class Join(NamedTuple):
@@ -82,11 +82,11 @@ class Join(NamedTuple):
 
     def __str__(self) -> str:
         """Return the text from which `parse_event` builds an equal event."""
-        text = f"{self.robot}@{_format_exactly(self.time)}"
+        text = f"{self.robot}@{format_exactly(self.time)}"
         if self.position is None:
             return text
         x, y = self.position
-        return f"{text}:{_format_exactly(x)},{_format_exactly(y)}"
+        return f"{text}:{format_exactly(x)},{format_exactly(y)}"
 
 
 class JoinedRobot(NamedTuple):
@@ -115,12 +115,6 @@ class JoinedRobot(NamedTuple):
     def offset(self) -> float:
         """Distance from the requested position, m; above 0 if a wall or another robot was too close to it."""
         return math.dist(self.position, self.requested_position)
-
-
-def _format_exactly(value: float) -> str:
-    """Format a number with as many digits as are needed to read the same number again."""
-    short_text = f"{value:g}"
-    return short_text if float(short_text) == value else repr(float(value))
 
 
 Event = TypeVar("Event", bound=Failure | Join)

@@ -15,6 +15,7 @@ from sample_sessions import HALL, LLOYD, PILLAR, RAPF, advance_session
 
 from robocov.conditions import Conditions
 from robocov.environment import UniformStart
+from robocov.errors import format_exactly
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov_app.cli import main
@@ -26,7 +27,7 @@ from robocov_app.viewer.session.files.session_file import load_session
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.sharing.share import ShareActions
-from robocov_app.viewer.sharing.values import format_number, format_python_text
+from robocov_app.viewer.sharing.values import format_python_text
 
 STEPS = 40
 ROOMS = load_map("rooms")
@@ -317,7 +318,7 @@ def test_the_message_about_a_copy_ends_with_a_command_that_opens_it(
 
 @pytest.mark.parametrize("value", [2.0, 0.1, 0.1 + 0.2, 1e-7, 123456789.125, np.inf])
 def test_numbers_are_exact(value: float) -> None:
-    assert float(format_number(value)) == value
+    assert float(format_exactly(value)) == value
 
 
 @pytest.mark.parametrize("text", ["rooms", "tür 🚪", "it's", 'a "b"', "'\"\\\n", "\x7f\u202e", "\udcff", ""])

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from robocov.conditions import PARAMETERS, Conditions
 from robocov.defaults import DEFAULT_DT_S
+from robocov.errors import format_exactly
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.session.setup.scenario import DEFAULT_PROPERTIES, SessionScenario
 from robocov_app.viewer.sharing.shared_run import SharedRun
-from robocov_app.viewer.sharing.values import format_gain_value, format_number, format_time
+from robocov_app.viewer.sharing.values import format_gain_value, format_time
 
 _PROPERTY_OPTIONS = (
     "radius",
@@ -133,7 +134,7 @@ def _list_common_options(run: SharedRun) -> Iterator[str]:
     if run.duration is not None:
         yield from ("--duration", format_time(run.duration))
     if scenario.dt != DEFAULT_DT_S:
-        yield from ("--dt", format_number(scenario.dt))
+        yield from ("--dt", format_exactly(scenario.dt))
     yield from _list_property_options(scenario.properties)
     yield from _list_condition_options(scenario)
 
@@ -142,7 +143,7 @@ def _list_property_options(properties: RobotProperties) -> Iterator[str]:
     for name in _PROPERTY_OPTIONS:
         value = getattr(properties, name)
         if value != getattr(DEFAULT_PROPERTIES, name):
-            yield from (_name_option(name), format_number(value))
+            yield from (_name_option(name), format_exactly(value))
 
 
 def _list_condition_options(scenario: SessionScenario) -> Iterator[str]:
@@ -152,7 +153,7 @@ def _list_condition_options(scenario: SessionScenario) -> Iterator[str]:
     for name in PARAMETERS:
         value = getattr(conditions, name)
         if value != getattr(_IDEAL, name):
-            yield from (_name_option(name), format_number(value))
+            yield from (_name_option(name), format_exactly(value))
     if conditions.hides_density:
         yield from ("--density", conditions.density)
 

@@ -2,29 +2,7 @@
 
 import math
 
-
-def format_number(value: float) -> str:
-    """Return a short text that is read back as exactly the same number; ``inf`` for infinity.
-
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> format_number(2.0)
-    '2'
-    >>> format_number(0.30000000000000004)
-    '0.30000000000000004'
-    """
-    text = f"{value:g}"
-    if float(text) == value:
-        return text
-    return repr(float(value))
+from robocov.errors import format_exactly
 
 
 def format_time(seconds: float) -> str:
@@ -62,7 +40,7 @@ def format_gain_value(value: float | str | None, *, is_json: bool) -> str:
         return "null" if is_json else "None"
     if isinstance(value, str):
         return value if is_json else format_python_text(value)
-    return format_number(value)
+    return format_exactly(value)
 
 
 def format_python_text(text: str) -> str:
@@ -105,4 +83,4 @@ def format_python_number(value: float) -> str:
     """
     if math.isinf(value):
         return 'float("inf")'
-    return format_number(value)
+    return format_exactly(value)
