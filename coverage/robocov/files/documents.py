@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -9,7 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from robocov.errors import Issue, MapError, quote_json
+from robocov.errors import InputError, Issue, MapError, quote, quote_json
 from robocov.files.strictjson import parse_json, read_bytes
 
 _EXPECTED_ERROR = "expected"
@@ -84,6 +85,32 @@ def read_document(path: Path, model: type[DocumentType], format_name: str, versi
     document = parse_json(read_bytes(path), source_name)
     check_header(document, source_name, format_name, version)
     return validate_document(document, source_name, model)
+
+
+def read_json_object(path: Path) -> dict[str, Any]:
+    """Read a JSON file that contains an object, without a check of its keys.
+
+    Parameters
+    ----------
+    path : Path
+        File to read.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or contains another value.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: expected a JSON object, got {quote(content)}")
+    return content
 
 
 def validate_document(document: object, source_name: str, model: type[DocumentType]) -> DocumentType:

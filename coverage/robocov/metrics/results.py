@@ -14,6 +14,7 @@ import numpy as np
 
 from robocov.errors import InputError, describe_unknown_name, format_count, quote
 from robocov.files.csv_cells import unquote_cell
+from robocov.files.documents import read_json_object
 from robocov.files.result_folder import require_result
 from robocov.files.result_names import COST_FILE, ERROR_FILE, RUNS_FOLDER, STUDY_FILE, SWEEP_TABLE_FILE
 from robocov.metrics.cost_history import CostHistory
@@ -105,14 +106,7 @@ class Results:
         InputError
             If the file cannot be read.
         """
-        path = self.folder / STUDY_FILE
-        try:
-            content = json.loads(path.read_bytes())
-        except (OSError, ValueError, RecursionError) as error:
-            raise InputError(f"{path}: cannot be read: {error}") from error
-        if not isinstance(content, dict):
-            raise InputError(f"{path}: expected a JSON object, got {quote(content)}")
-        return content
+        return read_json_object(self.folder / STUDY_FILE)
 
     def rows(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
         """Read the rows of the table one after another.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,8 +14,8 @@ from robocov.controllers import CONTROLLERS, get_gains
 from robocov.controllers.gains import Value
 from robocov.controllers.registry import get_controller_label
 from robocov.environment import Environment
-from robocov.errors import InputError, RobocovError, quote
-from robocov.files.documents import read_document
+from robocov.errors import InputError, RobocovError
+from robocov.files.documents import read_document, read_json_object
 from robocov.files.result_folder import complete_commit, require_result
 from robocov.files.result_names import COMPARISON_FILE, RUN_FILE, RUNS_FOLDER, STUDY_FILE
 from robocov.mapfile import from_json
@@ -91,7 +90,7 @@ def _load_runs(folder: Path) -> ReportedResult:
     maps: dict[str, Environment] = {}
     facts: dict[str, Any] = {}
     for saved_run in saved_runs:
-        content = _read_json_object(saved_run.folder / RUN_FILE)
+        content = read_json_object(saved_run.folder / RUN_FILE)
         run = _build_run(saved_run, content)
         runs.append(run)
         maps.setdefault(run.map, build_roster(saved_run.record).environment)
@@ -280,7 +279,7 @@ def _read_versions(runs: Iterable[ReportedRun]) -> Any:
         if run.error is not None:
             continue
         try:
-            return _read_json_object(run.folder / RUN_FILE).get("versions")
+            return read_json_object(run.folder / RUN_FILE).get("versions")
         except InputError:
             continue
     return None
@@ -362,14 +361,3 @@ def _read_metrics(summary: Any, history: CostHistory | None) -> dict[str, float 
     if metrics["mean_distance_over_run_m"] is None and np.isfinite(history.mean_distance).all():
         metrics["mean_distance_over_run_m"] = compute_mean_over_run(history.time, history.mean_distance)
     return metrics
-
-
-def _read_json_object(path: Path) -> dict[str, Any]:
-    """Read a JSON file that contains an object."""
-    try:
-        content = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: expected an object, got {quote(content)}")
-    return content
