@@ -126,9 +126,11 @@ class Results:
         InputError
             If there is no such column; the message suggests the most similar name.
         """
-        for name in () if columns is None else columns:
-            if name not in self.columns:
-                raise InputError(f"{self.folder}: {describe_unknown_name('column', name, self.columns)}")
+        if columns is not None:
+            for name in columns:
+                if name not in self.columns:
+                    message = describe_unknown_name("column", name, self.columns)
+                    raise InputError(f"{self.folder}: {message}")
         return read_rows(self._table, self._read_kinds(), columns)
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
