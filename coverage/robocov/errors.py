@@ -249,7 +249,7 @@ class ParameterError(InputError):
 
 
 class NoLayoutError(ParameterError):
-    """No layout of a random map was found that meets the requirements; another seed may have one."""
+    """No layout of a random map meets the requirements; another seed may have one."""
 
 
 class ControllerEndedError(RobocovError):
