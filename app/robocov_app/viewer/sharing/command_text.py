@@ -30,9 +30,9 @@ _IDEAL = Conditions()
 def can_be_command(run: SharedRun) -> bool:
     """Return whether the options of a command can describe a run.
 
-    There are no options for later edits, given starting positions, robots that differ from each other, their
-    mass, and a seed of the disturbances other than that of the starting positions. The window simulates
-    robots that fail or join differently from the command.
+    No option describes later edits, given starting positions, differing robots, a mass other than the
+    default, or a separate seed for the disturbances. Runs with failing or joining robots are excluded too:
+    the window simulates them differently from the command.
 
     Parameters
     ----------
