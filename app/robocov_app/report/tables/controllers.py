@@ -61,12 +61,14 @@ def _format_range(values: Sequence[Value], unit: str) -> str:
     numbers = [value for value in values if isinstance(value, int | float)]
     if not numbers:
         return "none"
-    low = f"{min(numbers):.4g}"
-    high = f"{max(numbers):.4g}"
+    minimum = min(numbers)
+    maximum = max(numbers)
+    low = format_value(minimum, digits=4)
+    high = format_value(maximum, digits=4)
     if low == high:
-        # Sampled gains have six significant digits.
-        low = f"{min(numbers):.6g}"
-        high = f"{max(numbers):.6g}"
+        # Sampled gains have six significant digits, so they may differ in the fifth or sixth.
+        low = format_value(minimum)
+        high = format_value(maximum)
     text = low if low == high else f"{low} to {high}"
     text += f" {unit}".rstrip()
     if len(numbers) < len(values):
