@@ -24,7 +24,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.environment import GRID_M
 from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
-from robocov.typing import FloatArray, IntArray
+from robocov.typing import AnyArray, FloatArray, IntArray
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 DEFAULT_SNAP_M = 0.01
@@ -155,30 +155,49 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
     return result
 
 
-def _choose_common_ends(points: FloatArray, tolerance: float) -> IntArray:
-    """Return the index of the end to which each of n ends moves, (n,)."""
-    count = len(points)
+def _choose_common_ends(points: AnyArray, tolerance: float) -> IntArray:
+    """Choose where each of n ends moves: return the index of the end whose original position it takes, (n,).
+
+    Parameters
+    ----------
+    points : (n,) array of shapely points, m
+    tolerance : float, m
+
+    Returns
+    -------
+    (n,) array
+    """
     first, second = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
     is_same_point = (shapely.distance(points[first], points[second]) == 0.0) & (first != second)
-    is_joint = np.zeros(count, dtype=bool)
+    is_joint = np.zeros(len(points), dtype=bool)
     is_joint[first[is_same_point]] = True
-    # A joint moves to the close joint with the lowest index.
-    chosen = np.arange(count)
+    # A joint moves to the original position of the close joint with the lowest index.
+    targets = np.arange(len(points))
     is_joint_pair = is_joint[first] & is_joint[second]
-    np.minimum.at(chosen, first[is_joint_pair], second[is_joint_pair])
-    # The other ends form chains. A chain moves to its end with the lowest index or, if it is close to a
-    # joint, with the joint.
+    np.minimum.at(targets, first[is_joint_pair], second[is_joint_pair])
+    # A chain moves to the original position of its end with the lowest index.
     is_link = ~is_joint[first] & ~is_joint[second]
-    link_ends = (first[is_link], second[is_link])
-    links = coo_array((np.ones(is_link.sum()), link_ends), shape=(count, count))
-    _, chain_of_end = connected_components(links, directed=False)
-    first_ends = np.full(count, count)
-    np.minimum.at(first_ends, chain_of_end, chosen)
-    joints = np.full(count, count)
+    chains = _number_chains(first[is_link], second[is_link], len(points))
+    _, first_ends = np.unique(chains, return_index=True)
+    chain_targets = targets[first_ends]
+    # A chain that is close to joints moves with one of them instead: to the lowest of their targets.
     is_near_joint = ~is_joint[first] & is_joint[second]
-    np.minimum.at(joints, chain_of_end[first[is_near_joint]], chosen[second[is_near_joint]])
-    target_of_chain = np.where(joints < count, joints, first_ends)
-    return np.asarray(target_of_chain[chain_of_end])
+    near_chains = chains[first[is_near_joint]]
+    joint_targets = targets[second[is_near_joint]]
+    order = np.argsort(joint_targets, kind="stable")
+    joined_chains, rows = np.unique(near_chains[order], return_index=True)
+    chain_targets[joined_chains] = joint_targets[order][rows]
+    return np.asarray(chain_targets[chains])
+
+
+def _number_chains(first: IntArray, second: IntArray, count: int) -> IntArray:
+    """Return the number of the chain of each of `count` ends, given the pairs of linked ends.
+
+    An end without links, such as a joint, is a chain of its own.
+    """
+    links = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    _, chains = connected_components(links, directed=False)
+    return np.asarray(chains)
 
 
 def _are_close(outlines: FloatArray, snap: float) -> bool:
