@@ -17,7 +17,7 @@ from xml.parsers import expat
 from robocov.errors import JsonPath, MapError, quote, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.files import JsonFile, is_number
-from robocov_app.formats.geodata.osm.data import USED_TAGS, OsmData, OsmElement
+from robocov_app.formats.geodata.osm.data import USED_TAGS, NodePosition, OsmData, OsmElement
 
 XML_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
 _JSON_ELEMENTS = re.compile(rb'"elements"\s*:\s*\[')
@@ -59,7 +59,7 @@ class _XmlReader:
         files.require_vertices(content.count(b"<tag") // 2, source_name)
         self.element: OsmElement | None = None
         self.member_id: int | None = None  # of the current member of a relation, if it is a way
-        self.member_line: list[tuple[float, float] | None] = []
+        self.member_line: list[NodePosition] = []
         self.depth = 0
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start_element
@@ -79,37 +79,45 @@ class _XmlReader:
         if self.depth == 1 and name != "osm":
             self._raise_error(f"expected <osm>, got <{to_one_line(name)[:40]}>")
         try:
-            self._add(name, attributes)
+            self._read_start_tag(name, attributes)
         except KeyError as error:
             self._raise_error(f"<{name}>: no {error.args[0]}")
         except ValueError as error:
             self._raise_error(f"<{name}>: {to_one_line(error)[:80]}")
 
-    def _add(self, name: str, attributes: dict[str, str]) -> None:
-        """Add the content of an XML element.
+    def _read_start_tag(self, name: str, attributes: dict[str, str]) -> None:
+        """Read the attributes of an XML element at any depth.
 
         Raise KeyError for a missing attribute, and ValueError for an invalid one.
         """
-        if name == "bounds" and self.depth == 2:  # deeper ones are those of single ways and relations
-            self.data.bounds.append(_parse_bounds(attributes))
-        elif self.depth == 2 and name in ("node", "way", "relation"):
-            self._add_osm_element(name, attributes)
-        elif self.element is None:
-            return
-        elif name == "nd" and self.depth == 3:
+        if self.depth == 2:
+            # Deeper bounds are those of single ways and relations, and are not read.
+            if name == "bounds":
+                self.data.bounds.append(_parse_bounds(attributes))
+            elif name in ("node", "way", "relation"):
+                self._start_osm_element(name, attributes)
+        elif self.element is not None:
+            self._read_child(self.element, name, attributes)
+
+    def _read_child(self, element: OsmElement, name: str, attributes: dict[str, str]) -> None:
+        """Read a tag or a member of a node, way or relation, or a node of a member."""
+        if name == "nd" and self.depth == 3:
+            # A node of a way, with its position for `out geom`.
             node_id = int(attributes["ref"])
-            self.element.members.append(node_id)
+            element.members.append(node_id)
             self.data.add_way_node(node_id, _parse_position(attributes))
         elif name == "nd":
+            # A node of a way that is a member of a relation, for `out geom`.
             self.member_line.append(_parse_position(attributes))
         elif name == "member" and attributes["type"] == "way":
+            # The nodes of the way follow in the children of the member.
             self.member_id = int(attributes["ref"])
             self.member_line = []
-            self.element.members.append(self.member_id)
+            element.members.append(self.member_id)
         elif name == "tag" and attributes["k"] in USED_TAGS:
-            self.element.tags[attributes["k"]] = attributes["v"]
+            element.tags[attributes["k"]] = attributes["v"]
 
-    def _add_osm_element(self, kind: str, attributes: dict[str, str]) -> None:
+    def _start_osm_element(self, kind: str, attributes: dict[str, str]) -> None:
         """Start a node, way or relation, unless it was deleted; tags and members follow in its children."""
         number = int(attributes["id"])
         if attributes.get("action") == "delete" or attributes.get("visible") == "false":
@@ -234,17 +242,17 @@ def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], locat
     return numbers
 
 
-def _parse_json_line(file: JsonFile, value: Any, location: JsonPath) -> list[tuple[float, float] | None]:
+def _parse_json_line(file: JsonFile, value: Any, location: JsonPath) -> list[NodePosition]:
     """Return the points of a line, with None for points outside the query's bounding box."""
     if not isinstance(value, list):
         raise file.build_error(location, value, "a list of lat and lon")
-    line: list[tuple[float, float] | None] = []
+    line: list[NodePosition] = []
     for k, point in enumerate(value):
         line.append(None if point is None else _parse_json_point(file, point, (*location, k)))
     return line
 
 
-def _parse_position(attributes: Mapping[str, str]) -> tuple[float, float] | None:
+def _parse_position(attributes: Mapping[str, str]) -> NodePosition:
     """Return the longitude and latitude of a node of a way, or None if it is given without them."""
     if "lat" not in attributes and "lon" not in attributes:
         return None
