@@ -460,10 +460,7 @@ def measure_ranges(controller: str, count: int, pool: ProcessPoolExecutor) -> It
 def run_with_stake(controller: str, stake: float, map_case: tuple[str, int]) -> FinalState:
     """Run six robots for 60 s on a new map of a kind, given with its seed."""
     kind, seed = map_case
-    if kind in suite.GENERATORS:
-        environment = generate_map(seed, kind=kind)
-    else:
-        environment = suite.build_floor_plan(kind, seed)
+    environment = suite.build_family_map(kind, seed)
     starts = environment.start(None).sample(suite.TEAM_SIZE, seed=0, radius=suite.ROBOT_RADIUS_M)
     simulation = Simulation(environment, make_controller(controller, {"stake": stake}), starts)
     record = simulation.run(60.0)

@@ -20,13 +20,14 @@ import numpy as np
 from robocov.controllers import LocalSearch
 from robocov.controllers.placement.placement_controller import PlacementMemory
 from robocov.environment import Environment
-from robocov.errors import RobocovError
-from robocov.generator import GENERATORS, generate_map
+from robocov.errors import NoLayoutError
+from robocov.generator import GENERATORS
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.typing import Float32Array, FloatArray
+from robocov_app.benchmark import suite
 from robocov_app.benchmark.learned import (
     DIRECTIONS,
     INPUT_SIZE,
@@ -39,7 +40,6 @@ from robocov_app.benchmark.learned import (
     build_inputs,
     to_offsets,
 )
-from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
 from robocov_app.learning.policy_network import Network, evaluate_network
 
 SEED = 1
@@ -135,10 +135,8 @@ def draw_map(rng: np.random.Generator) -> Environment:
         family = FAMILIES[rng.integers(len(FAMILIES))]
         seed = FIRST_MAP_SEED + int(rng.integers(100_000))
         try:
-            if family in FLOOR_PLANS:
-                return build_floor_plan(family, seed)
-            return generate_map(seed, kind=family)
-        except RobocovError:
+            return suite.build_family_map(family, seed)
+        except NoLayoutError:
             continue  # Not every seed gives a map.
 
 

@@ -234,13 +234,41 @@ def build_map(name: str) -> Environment:
         return add_hot_spots(plain, int(seed))
     if name.startswith("large-"):
         return generate_map(int(seed), kind=kind, obstacles=_LARGE_OBSTACLES, side=_LARGE_SIDE_M)
-    if kind in GENERATORS and name not in _BUNDLED:
-        return generate_map(int(seed), kind=kind)
-    if kind in FLOOR_PLANS:
-        return build_floor_plan(kind, int(seed))
     if kind in LARGE_PLANS:
         return build_large_plan(kind, int(seed))
+    # Bundled maps such as blocks-a are named like generated ones.
+    if has_generator(kind) and name not in _BUNDLED:
+        return build_family_map(kind, int(seed))
     return load_map(name)
+
+
+def has_generator(family: str) -> bool:
+    """Return whether a family has random maps that `build_family_map` builds."""
+    return family in GENERATORS or family in FLOOR_PLANS
+
+
+def build_family_map(family: str, seed: int) -> Environment:
+    """Build a random map of a family, which need not be part of the suite.
+
+    Parameters
+    ----------
+    family : str
+        Name of a family that `has_generator`.
+    seed : int
+        Seed of the random numbers.
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    NoLayoutError
+        If no map with this seed is suitable.
+    """
+    if family in FLOOR_PLANS:
+        return build_floor_plan(family, seed)
+    return generate_map(seed, kind=family)
 
 
 def compute_map_hash(environment: Environment) -> str:

@@ -17,7 +17,8 @@ from small_studies import HEAD, PULL, DirectExecutor
 
 from robocov.conditions.random_streams import POSITION_STREAM, create_generator
 from robocov.controllers import CONTROLLERS
-from robocov.errors import InputError
+from robocov.environment import Environment
+from robocov.errors import InputError, NoLayoutError, ParameterError
 from robocov.generator import GENERATORS
 from robocov.observation import Snapshot
 from robocov_app.benchmark import suite
@@ -776,6 +777,16 @@ def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
         assert new_map.name not in suite.FAMILY_OF
         assert suite.compute_map_hash(new_map.environment) not in hashes
         assert len(new_map.environment.start().sample(6, seed=new_map.start_seed)) == 6
+
+
+def test_a_family_without_suitable_seeds_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    def find_no_layout(family: str, seed: int) -> Environment:
+        raise NoLayoutError(f"map {family}-{seed}: no random plan is suitable")
+
+    monkeypatch.setattr(suite, "build_family_map", find_no_layout)
+    message = "--new-maps: none of 100 seeds gives a map of the family caves"
+    with pytest.raises(ParameterError, match=f"^{message}$"):
+        sample_new_maps(["caves"], 1, np.random.default_rng(3))
 
 
 @pytest.mark.parametrize(

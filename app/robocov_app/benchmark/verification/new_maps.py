@@ -20,9 +20,7 @@ import numpy as np
 
 from robocov.environment import Environment
 from robocov.errors import NoLayoutError, ParameterError
-from robocov.generator import GENERATORS, generate_map
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
 
 MAX_NEW_MAPS = len(suite.FAMILIES) - 1
 """Maximum number of new maps: one of each family that has a generator."""
@@ -122,11 +120,7 @@ def choose_track(
 def _count_maps_by_family(maps: Iterable[str]) -> Counter[str]:
     """Return the number of maps of each family that has a generator."""
     families = (suite.FAMILY_OF[name] for name in maps)
-    return Counter(family for family in families if _has_generator(family))
-
-
-def _has_generator(family: str) -> bool:
-    return family in GENERATORS or family in FLOOR_PLANS
+    return Counter(family for family in families if suite.has_generator(family))
 
 
 def _compute_min_p_value(family_sizes: Iterable[int]) -> float:
@@ -153,9 +147,9 @@ def sample_new_maps(families: Sequence[str], count: int, rng: np.random.Generato
     Raises
     ------
     ParameterError
-        If no seed gives a map of a family.
+        If none of the seeds that are tried gives a map of a family.
     """
-    generated_families = [family for family in families if _has_generator(family)]
+    generated_families = [family for family in families if suite.has_generator(family)]
     chosen = rng.permutation(len(generated_families))[:count].tolist()
     return [_sample_map(generated_families[k], rng) for k in sorted(chosen)]
 
@@ -165,15 +159,12 @@ def _sample_map(family: str, rng: np.random.Generator) -> NewMap:
     for _ in range(_MAX_ATTEMPTS):
         seed = int(rng.integers(suite.MIN_NEW_SEED, _MAX_MAP_SEED))
         try:
-            if family in GENERATORS:
-                environment = generate_map(seed, kind=family)
-            else:
-                environment = build_floor_plan(family, seed)
+            environment = suite.build_family_map(family, seed)
         except NoLayoutError:
             continue
         start_seed = int(rng.integers(_MAX_MAP_SEED))
         return NewMap(f"{family}-{seed}", family, start_seed, environment)
-    raise ParameterError(f"--new-maps: no seed gives a map of the family {family}")
+    raise ParameterError(f"--new-maps: none of {_MAX_ATTEMPTS} seeds gives a map of the family {family}")
 
 
 def compare_gaps(
