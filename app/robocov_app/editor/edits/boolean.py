@@ -84,9 +84,9 @@ def _offset_item(item: Item, distance: float) -> Sequence[Obstacle]:
 
 def clip_to_boundary(sketch: Sketch, selection: Selection) -> Change:
     """Clip the selected obstacles to the boundary, or all obstacles if none is selected."""
-    if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
+    inside = _build_boundary_polygon(sketch)
+    if inside is None or not inside.is_valid:
         raise MapError("the boundary must be valid first")
-    inside = shapely.Polygon(sketch.boundary)
     shapely.prepare(inside)
     items: Sequence[Item] = sketch.obstacles
     if selection.items:
@@ -150,17 +150,24 @@ def _is_broken(shape: Obstacle) -> bool:
 
 
 def _repair_boundary(sketch: Sketch) -> tuple[tuple[float, float], ...] | None:
-    """Return the largest part of a self-intersecting boundary, or the boundary itself if it is valid.
+    """Return the largest part of a self-intersecting boundary, or None if no part has an area.
 
-    Return None if it has no area.
+    A boundary that is valid, or that has fewer than three corners, is returned unchanged.
     """
-    boundary = sketch.boundary
-    if boundary is None or len(boundary) < 3 or shapely.Polygon(boundary).is_valid:
-        return boundary
-    parts = extract_polygons(shapely.make_valid(shapely.Polygon(boundary)))
+    polygon = _build_boundary_polygon(sketch)
+    if polygon is None or polygon.is_valid:
+        return sketch.boundary
+    parts = extract_polygons(shapely.make_valid(polygon))
     if not parts:
         return None
     return parts[0].vertices
+
+
+def _build_boundary_polygon(sketch: Sketch) -> shapely.Polygon | None:
+    """Build the polygon inside the boundary, or return None if the boundary has fewer than three corners."""
+    if sketch.boundary is None or len(sketch.boundary) < 3:
+        return None
+    return shapely.Polygon(sketch.boundary)
 
 
 def _unite_geometries(items: Sequence[Item]) -> shapely.Geometry:
