@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
+import shapely
 
-from robocov.arrays import compute_lengths
 from robocov.typing import FloatArray, IntArray
 
 Frame: TypeAlias = tuple[float, float, float, float]
@@ -24,8 +24,6 @@ _OVERLAP_COST = 10.0
 """Cost per square pixel that a label shares with marks or other labels, in pixels of distance."""
 _LINE_COST = 3.0
 """Cost per pixel of the line that a label covers, in pixels of distance."""
-_LINE_STEP_PX = 2.0
-"""Distance between the points that represent the line."""
 _OUTSIDE_COST = 1000.0
 """Cost per square pixel of a label outside the frame, which would be cut off or cover the axes."""
 _MAX_ROUNDS = 6
@@ -55,14 +53,13 @@ def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame, line: F
     """
     half_sizes = compute_half_sizes(labels)
     mark_boxes = np.hstack([marks - MARK_HALF_SIZE_PX, marks + MARK_HALF_SIZE_PX])
-    line_points = _sample_line(line)
     candidates = []
     costs = []
     for mark, half_size in zip(marks, half_sizes, strict=True):
         centers = mark + _list_offsets(half_size)
-        candidates.append(np.hstack([centers - half_size, centers + half_size]))
-        line_costs = _LINE_COST * _LINE_STEP_PX * _count_points(candidates[-1], line_points)
-        costs.append(_compute_costs(mark, centers, half_size, mark_boxes, frame) + line_costs)
+        boxes = np.hstack([centers - half_size, centers + half_size])
+        candidates.append(boxes)
+        costs.append(_compute_costs(mark, boxes, mark_boxes, frame, line))
     # From top to bottom, so that few lines to labels cross.
     order = np.argsort(-marks[:, 1], kind="stable")
     chosen = _choose_candidates(candidates, costs, order)
@@ -71,17 +68,19 @@ def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame, line: F
 
 
 def _compute_costs(
-    mark: FloatArray, centers: FloatArray, half_size: FloatArray, mark_boxes: FloatArray, frame: Frame
+    mark: FloatArray, boxes: FloatArray, mark_boxes: FloatArray, frame: Frame, line: FloatArray
 ) -> FloatArray:
-    """Return the cost of placing the label of a mark at each of k centers, without other labels, (k,)."""
-    boxes = np.hstack([centers - half_size, centers + half_size])
-    label_area = 4.0 * half_size.prod()
-    outside_areas = label_area - _compute_overlaps(boxes, np.array([frame]))[:, 0]
+    """Return the cost of placing the label of a mark in each of k boxes, without other labels, (k,)."""
+    half_sizes = 0.5 * (boxes[:, 2:] - boxes[:, :2])
+    centers = boxes[:, :2] + half_sizes
+    label_areas = 4.0 * half_sizes.prod(axis=1)
+    outside_areas = label_areas - _compute_overlaps(boxes, np.array([frame]))[:, 0]
     covered_areas = _compute_overlaps(boxes, mark_boxes).sum(axis=1)
-    distances = np.linalg.norm(compute_nearest_points(mark, centers, half_size) - mark, axis=1)
+    distances = np.linalg.norm(compute_nearest_points(mark, centers, half_sizes) - mark, axis=1)
     heights = np.abs(centers[:, 1] - mark[1])
     costs: FloatArray = distances + _HEIGHT_COST * heights
     costs += _OUTSIDE_COST * outside_areas + _OVERLAP_COST * covered_areas
+    costs += _LINE_COST * _compute_covered_lengths(boxes, line)
     return costs
 
 
@@ -124,9 +123,9 @@ def compute_half_sizes(labels: Sequence[str]) -> FloatArray:
     return np.array([(0.5 * CHARACTER_WIDTH_PX * len(label), 0.5 * LINE_HEIGHT_PX) for label in labels])
 
 
-def compute_nearest_points(mark: FloatArray, centers: FloatArray, half_size: FloatArray) -> FloatArray:
+def compute_nearest_points(mark: FloatArray, centers: FloatArray, half_sizes: FloatArray) -> FloatArray:
     """Return the point of each label that is closest to a mark, with the shape of `centers`, px."""
-    return np.clip(mark, centers - half_size, centers + half_size)
+    return np.clip(mark, centers - half_sizes, centers + half_sizes)
 
 
 def _list_offsets(half_size: FloatArray) -> FloatArray:
@@ -142,21 +141,12 @@ def _list_offsets(half_size: FloatArray) -> FloatArray:
     return np.array(offsets)
 
 
-def _sample_line(line: FloatArray) -> FloatArray:
-    """Return points along a line, one in each step of `_LINE_STEP_PX`, (p, 2) px."""
+def _compute_covered_lengths(boxes: FloatArray, line: FloatArray) -> FloatArray:
+    """Return the length of a line in each of n boxes, (n,) px; zero for a line of fewer than two vertices."""
     if len(line) < 2:
-        return np.empty((0, 2))
-    lengths = np.concatenate([[0.0], np.cumsum(compute_lengths(np.diff(line, axis=0)))])
-    distances = np.arange(0.5 * _LINE_STEP_PX, lengths[-1], _LINE_STEP_PX)
-    return np.column_stack([np.interp(distances, lengths, coordinates) for coordinates in line.T])
-
-
-def _count_points(boxes: FloatArray, points: FloatArray) -> IntArray:
-    """Return the number of points in each of n boxes, (n,)."""
-    is_above_minimum = points > boxes[:, None, :2]
-    is_below_maximum = points < boxes[:, None, 2:]
-    counts: IntArray = (is_above_minimum & is_below_maximum).all(axis=2).sum(axis=1)
-    return counts
+        return np.zeros(len(boxes))
+    pieces = shapely.intersection(shapely.box(*boxes.T), shapely.LineString(line))
+    return np.asarray(shapely.length(pieces))
 
 
 def _compute_overlaps(boxes: FloatArray, others: FloatArray) -> FloatArray:
