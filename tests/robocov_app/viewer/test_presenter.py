@@ -12,6 +12,7 @@ from pointer_events import build_event
 from sample_sessions import HALL, LLOYD, RAPF, RPF, build_presenter, describe_state
 
 from robocov.environment import Environment
+from robocov.errors import ParameterError
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
@@ -172,6 +173,25 @@ def test_the_next_map_skips_maps_that_cannot_be_opened(
     run_command(viewer, "map:next")
     assert viewer.files.map_name == "square"
     assert viewer.message == f"No space for 3 robots: {small}; cannot be read: {unreadable}"
+
+
+def test_a_map_that_the_controller_rejects_is_not_reported_as_too_small(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    viewer = build_presenter()
+    open_map = viewer.files.open_map
+
+    def reject_square(name: str) -> None:
+        if name == "square":
+            raise ParameterError("the controller does not accept the map")
+        open_map(name)
+
+    monkeypatch.setattr(viewer.files, "list_maps", lambda: ["rooms", "square", "office"])
+    run_text(viewer, "map rooms")
+    monkeypatch.setattr(viewer.files, "open_map", reject_square)
+    run_command(viewer, "map:next")
+    assert viewer.files.map_name == "office"
+    assert viewer.message == "Cannot be used: square"
 
 
 def test_a_user_map_is_offered_after_the_bundled_maps() -> None:

@@ -1,11 +1,11 @@
 """Actions on files: maps, sessions and drafts of the viewer."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from robocov.environment import Environment
-from robocov.errors import InputError, MapError, format_count
+from robocov.errors import InputError, MapError, StartError, format_count
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
@@ -134,33 +134,39 @@ class FileActions:
         self.map_name = name
 
     def open_next_map(self, steps: int) -> None:
-        """Restart on the next map with enough space for the team (`steps` 1), or on the previous one (-1)."""
+        """Restart on the next map that the team can use (`steps` 1), or on the previous one (-1)."""
         names = self.list_maps()
         index = names.index(self.map_name) if self.map_name in names else 0
         too_small: list[str] = []
         unreadable: list[str] = []
+        unusable: list[str] = []
         for k in range(1, len(names) + 1):
             name = names[(index + steps * k) % len(names)]
             try:
                 self.open_map(name)
             except MapError:
                 unreadable.append(name)
-            except InputError:
+            except StartError:
                 too_small.append(name)
+            except InputError:
+                # For example, the controller does not accept the map.
+                unusable.append(name)
             else:
                 break
-        self._report_skipped_maps(too_small, unreadable)
+        robots = format_count(self._viewer.session.timeline.scenario.robots, "robot")
+        self._report_skipped_maps(
+            {
+                f"no space for {robots}": too_small,
+                "cannot be read": unreadable,
+                "cannot be used": unusable,
+            }
+        )
 
-    def _report_skipped_maps(self, too_small: list[str], unreadable: list[str]) -> None:
+    def _report_skipped_maps(self, names_by_reason: Mapping[str, Sequence[str]]) -> None:
         """Show a message with the names of the maps that could not be opened, if there are any."""
-        reasons: list[str] = []
-        if too_small:
-            robots = format_count(self._viewer.session.timeline.scenario.robots, "robot")
-            reasons.append(f"no space for {robots}: {', '.join(too_small)}")
-        if unreadable:
-            reasons.append(f"cannot be read: {', '.join(unreadable)}")
-        if reasons:
-            self._viewer.show_message("; ".join(reasons))
+        texts = [f"{reason}: {', '.join(names)}" for reason, names in names_by_reason.items() if names]
+        if texts:
+            self._viewer.show_message("; ".join(texts))
 
     def save_map(self) -> None:
         """Save the map to a new file."""
