@@ -222,7 +222,7 @@ class WktParser:
             self._add_points(self._parse_points(geometry, minimum=1), geometry)
             return
         for _ in self._iterate_items():
-            if scanner.text.startswith("(", scanner.position):
+            if scanner.is_at("("):
                 points = self._parse_points(geometry, minimum=1)
             else:
                 points = self._parse_bare_point(geometry)
@@ -240,8 +240,7 @@ class WktParser:
         match = scanner.match(_POINTS)
         if match is None:
             self._raise_points_error()
-        scanner.position = match.start(1)
-        points = self._convert_points(match[1], geometry)
+        points = self._convert_points(match[1], match.start(1), geometry)
         if len(points) < minimum:
             scanner.raise_error(f"expected at least {minimum} points, got 1", match.start())
         scanner.position = match.end()
@@ -251,26 +250,28 @@ class WktParser:
         """Parse a point without brackets; return its first two coordinates, (1, 2)."""
         match = self._scanner.match(_BARE_POINT)
         assert match is not None  # the pattern also matches empty text
-        points = self._convert_points(match[0], geometry)
+        points = self._convert_points(match[0], match.start(), geometry)
         self._scanner.position = match.end()
         return points
 
-    def _convert_points(self, list_text: str, geometry: _Geometry) -> FloatArray:
-        """Convert a list of points at the current position; return their first two coordinates, (k, 2)."""
-        scanner = self._scanner
-        start = scanner.position
+    def _convert_points(self, list_text: str, start: int, geometry: _Geometry) -> FloatArray:
+        """Convert a list of points that begins at index `start`.
+
+        Return their first two coordinates, (k, 2).
+        """
+        position = start
         rows: list[list[float]] = []
         for text in list_text.split(","):
             try:
                 rows.append([float(number) for number in text.split()])
             except ValueError:
-                self._raise_point_error()
+                self._raise_point_error(position)
             if not 2 <= len(rows[-1]) <= 4 or len(rows[-1]) != len(rows[0]):
-                self._raise_point_error()
-            scanner.position += len(text) + 1
+                self._raise_point_error(position)
+            position += len(text) + 1
         points = np.array(rows)
         if not (np.abs(points) < _MAX_NUMBER).all():
-            scanner.raise_error("expected finite numbers", start)
+            self._scanner.raise_error("expected finite numbers", start)
         dimensions = points.shape[1]
         has_heights = dimensions > 2 and not (geometry.is_measured and dimensions == 3)
         if has_heights:
@@ -289,14 +290,13 @@ class WktParser:
             scanner.position = end
             scanner.raise_error(f"expected a point or ), got {scanner.quote_next()}")
         comma = scanner.text.rfind(",", scanner.position, end)
-        if comma >= 0:
-            scanner.position = comma + 1
-        self._raise_point_error()
+        self._raise_point_error(comma + 1 if comma >= 0 else scanner.position)
 
-    def _raise_point_error(self) -> NoReturn:
-        """Raise MapError for the point that follows."""
+    def _raise_point_error(self, position: int) -> NoReturn:
+        """Raise MapError for the point that begins at index `position`."""
         scanner = self._scanner
-        ahead = scanner.text[scanner.position : scanner.position + _MAX_POINT_CHARACTERS]
+        scanner.position = position
+        ahead = scanner.text[position : position + _MAX_POINT_CHARACTERS]
         point = ahead.split(",")[0].split(")")[0]
         scanner.skip_space()
         actual = quote(" ".join(point.split())) if point.strip() else "nothing"

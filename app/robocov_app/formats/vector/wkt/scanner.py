@@ -44,6 +44,10 @@ class Scanner:
         self.skip_space()
         return self.position == len(self.text)
 
+    def is_at(self, text: str) -> bool:
+        """Return whether a text follows at the current position."""
+        return self.text.startswith(text, self.position)
+
     def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
         """Match a pattern at the current position, without moving past it."""
         return pattern.match(self.text, self.position)
