@@ -30,6 +30,7 @@ from new_families import FAMILIES, SEEDS, build_maps, compute_hash
 
 from robocov import Environment, save_map
 from robocov.errors import RobocovError
+from robocov.files.writing import replace_file
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.references import RESTARTS
@@ -117,7 +118,8 @@ def search_references(
         for name, placement in answer_queries(queries, workers, stop):
             references[name] = Reference(placement.mean_distance, placement.agreement)
             document = {key: reference._asdict() for key, reference in references.items()}
-            path.write_text(json.dumps(document, indent=1), encoding="utf-8")
+            with replace_file(path) as temporary:
+                temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
             update(len(references))
     if len(references) < len(maps):
         raise KeyboardInterrupt
@@ -136,8 +138,10 @@ def read_runs(study: Study, folder: Path, references: Mapping[str, Reference]) -
     ledger = Ledger(folder)
     for task in generate_tasks(study):
         entry = ledger.read_entry(task)
-        if entry is None or entry.error is not None:
-            raise SystemExit(f"{folder}: {task.name}: {'missing' if entry is None else entry.error}")
+        if entry is None:
+            raise SystemExit(f"{folder}: {task.name}: missing")
+        if entry.error is not None:
+            raise SystemExit(f"{folder}: {task.name}: {entry.error}")
         metrics: Mapping[str, Any] = entry.metrics
         run = Run(
             map_name=task.map,
@@ -149,20 +153,21 @@ def read_runs(study: Study, folder: Path, references: Mapping[str, Reference]) -
         yield task.controller, run
 
 
-def format_result(track: str, controller: str, runs: Sequence[Run]) -> str:
+def format_result_row(track: str, controller: str, runs: Sequence[Run]) -> str:
     """Format a row of the first table as Markdown."""
-    gaps = [run.gap for run in runs]
-    map_names = sorted({run.map_name for run in runs})
-    map_gaps = [np.median([run.gap for run in runs if run.map_name == name]) for name in map_names]
-    large_count = sum(gap > LARGE_GAP for gap in map_gaps)
+    gaps_by_map: dict[str, list[float]] = {}
+    for run in runs:
+        gaps_by_map.setdefault(run.map_name, []).append(run.gap)
+    large_count = sum(np.median(map_gaps) > LARGE_GAP for map_gaps in gaps_by_map.values())
     contact_count = sum(run.has_contacts for run in runs)
+    median_gap = np.median([run.gap for run in runs])
     settled_fraction = np.mean([run.is_settled for run in runs])
     path_length = np.median([run.path_length for run in runs])
     cells = [
         suite.format_heading(track),
         f"`{controller}`",
-        f"{100.0 * np.median(gaps):.1f}",
-        f"{large_count} of {len(map_names)}",
+        f"{100.0 * median_gap:.1f}",
+        f"{large_count} of {len(gaps_by_map)}",
         f"{contact_count} of {len(runs)}",
         f"{100.0 * settled_fraction:.0f}",
         f"{path_length:.1f}",
@@ -170,7 +175,7 @@ def format_result(track: str, controller: str, runs: Sequence[Run]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def format_family_gaps(track: str, controller: str, runs: Sequence[Run]) -> str:
+def format_family_row(track: str, controller: str, runs: Sequence[Run]) -> str:
     """Format a row of the second table as Markdown."""
     cells = [suite.format_heading(track), f"`{controller}`"]
     for family in FAMILIES:
@@ -215,10 +220,10 @@ def run_all(arguments: argparse.Namespace, maps: Mapping[str, Environment], stop
             runs[track, controller].append(run)
     print(RESULT_HEAD)
     for key, group in runs.items():
-        print(format_result(*key, group))
+        print(format_result_row(*key, group))
     print(f"\nMedian gap on each family, %\n\n{FAMILY_HEAD}")
     for key, group in runs.items():
-        print(format_family_gaps(*key, group))
+        print(format_family_row(*key, group))
     print("", *format_worst_runs(runs), "", *describe_references(references), sep="\n")
 
 

@@ -57,11 +57,12 @@ RING_SIDES = (5, 6, 8, CIRCLE_SIDES)
 """Numbers of sides that rings may have."""
 OUTER_COURT_WIDTHS_M = (1.3, 1.8)
 """Range of the distance from the corners of the first ring to the boundary."""
-RING_DISTANCES_M = (1.3, 1.7)
+RING_SPACINGS_M = (1.3, 1.7)
 """Range of the distance between the corners of consecutive rings."""
 MIN_RING_RADIUS_M = 1.2
 RING_OPENINGS_M = (0.8, 1.2)
 BARRIER_PROBABILITY = 0.6
+"""Probability of a barrier between two consecutive rings."""
 
 CELL_SIDES_M = (1.4, 1.6)
 CELL_ROWS = (4, 5)
@@ -70,6 +71,10 @@ MAX_REMOVED_CELLS = 3
 CELL_DOORS_M = (0.7, 0.9)
 EXTRA_DOOR_PROBABILITY = 0.2
 """Probability of a door in a wall that could be closed."""
+MAX_CORNER_ERROR_M = 1e-6
+"""Maximum distance between equal corners of neighboring cells, which differ by rounding errors."""
+CELL_OUTLINE_TOLERANCE_M = 1e-3
+"""Maximum distance by which the outline of all cells is moved when needless corners are removed."""
 
 STAR_TIPS = (6, 7, 8, 9)
 STAR_RADII_M = (5.6, 6.8)
@@ -148,7 +153,7 @@ def draw_spiral(rng: np.random.Generator) -> FloorPlan:
     walls = []
     for arm in range(arms):
         angles = first_angle + math.tau * arm / arms + direction * turns
-        walls.append(compute_points(radii, angles) * stretch)
+        walls.append(to_cartesian(radii, angles) * stretch)
     boundary = build_regular_polygon(CIRCLE_SIDES, radius, 0.0) * stretch
     return build_plan(boundary, walls)
 
@@ -158,31 +163,34 @@ def draw_rings(rng: np.random.Generator) -> FloorPlan:
     width, height = rng.uniform(*COURT_SIDES_M, 2)
     sides = int(rng.choice(RING_SIDES))
     rotation = rng.uniform(0.0, math.tau)
-    distance = rng.uniform(*RING_DISTANCES_M)
+    ring_spacing = rng.uniform(*RING_SPACINGS_M)
     radius = min(width, height) / 2.0 - rng.uniform(*OUTER_COURT_WIDTHS_M)
     walls = []
     outer_ring: FloatArray | None = None
     outer_opening = 0.0
     while radius >= MIN_RING_RADIUS_M:
         ring = build_regular_polygon(sides, radius, rotation)
-        side = int(rng.integers(sides))
+        opening_side = int(rng.integers(sides))
         opening_width = rng.uniform(*RING_OPENINGS_M)
-        walls.append(cut_opening(ring, side, opening_width))
-        opening = rotation + (side + 0.5) * math.tau / sides
+        walls.append(cut_opening(ring, opening_side, opening_width))
+        opening = rotation + (opening_side + 0.5) * math.tau / sides
         if outer_ring is not None and rng.random() < BARRIER_PROBABILITY:
-            angle = find_opposite_angle(outer_opening, opening)
+            angle = find_middle_of_larger_arc(outer_opening, opening)
             walls.append(build_barrier(outer_ring, ring, angle))
         outer_ring = ring
         outer_opening = opening
-        radius -= distance
+        radius -= ring_spacing
     corner = np.array([width, height]) / 2.0
     boundary = corner * [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
     return build_plan(boundary, walls)
 
 
-def cut_opening(ring: FloatArray, side: int, width: float) -> FloatArray:
-    """Return the points of a ring without an opening in the middle of one of its sides."""
-    corners = np.roll(ring, -side - 1, axis=0)
+def cut_opening(ring: FloatArray, opening_side: int, width: float) -> FloatArray:
+    """Cut an opening in the middle of a side of a ring; return the points of the wall that remains, (k, 2) m.
+
+    Side k leads from corner k of the ring to the next one.
+    """
+    corners = np.roll(ring, -opening_side - 1, axis=0)
     middle = (corners[-1] + corners[0]) / 2.0
     line = LineString([middle, *corners, middle])
     wall = substring(line, width / 2.0, line.length - width / 2.0)
@@ -190,7 +198,7 @@ def cut_opening(ring: FloatArray, side: int, width: float) -> FloatArray:
     return points
 
 
-def find_opposite_angle(first: float, second: float) -> float:
+def find_middle_of_larger_arc(first: float, second: float) -> float:
     """Return the middle of the larger of the two arcs between two angles."""
     difference = (second - first) % math.tau
     middle = first + difference / 2.0
@@ -210,10 +218,10 @@ def build_barrier(outer_ring: FloatArray, inner_ring: FloatArray, angle: float) 
 
 def draw_honeycomb(rng: np.random.Generator) -> FloorPlan:
     """Draw hexagonal cells, which are connected by the doors of a random spanning tree and a few more."""
-    side = rng.uniform(*CELL_SIDES_M)
+    side_length = rng.uniform(*CELL_SIDES_M)
     cells = choose_cells(rng, int(rng.choice(CELL_ROWS)))
     rotation = rng.uniform(0.0, math.tau)
-    hexagons = [build_cell(row, column, side) for row, column in cells]
+    hexagons = [build_cell(row, column, side_length) for row, column in cells]
     connected = DisjointSet(range(len(hexagons)))
     pairs = list(itertools.combinations(range(len(hexagons)), 2))
     walls = []
@@ -230,9 +238,10 @@ def draw_honeycomb(rng: np.random.Generator) -> FloorPlan:
         else:
             walls.append(extend_wall(*shared_side))
     # Sides of neighbors are equal only up to rounding errors.
-    grown_hexagons = [Polygon(hexagon).buffer(1e-6, join_style="mitre") for hexagon in hexagons]
-    boundary = shapely.simplify(shapely.union_all(grown_hexagons), 1e-3).exterior.coords[:-1]
-    return build_plan(rotate(np.array(boundary), rotation), [rotate(wall, rotation) for wall in walls])
+    grown_hexagons = [Polygon(hexagon).buffer(MAX_CORNER_ERROR_M, join_style="mitre") for hexagon in hexagons]
+    outline = shapely.simplify(shapely.union_all(grown_hexagons), CELL_OUTLINE_TOLERANCE_M)
+    boundary = np.array(outline.exterior.coords[:-1])
+    return build_plan(rotate(boundary, rotation), [rotate(wall, rotation) for wall in walls])
 
 
 def choose_cells(rng: np.random.Generator, rows: int) -> list[tuple[int, int]]:
@@ -246,17 +255,17 @@ def choose_cells(rng: np.random.Generator, rows: int) -> list[tuple[int, int]]:
     return [cell for cell in cells if list(cell) not in removed]
 
 
-def build_cell(row: int, column: int, side: float) -> FloatArray:
+def build_cell(row: int, column: int, side_length: float) -> FloatArray:
     """Build a hexagon. Every second row is shifted by half a cell."""
-    x = math.sqrt(3.0) * side * (column + 0.5 * (row % 2))
-    y = 1.5 * side * row
-    return np.array([x, y]) + build_regular_polygon(6, side, math.pi / 6.0)
+    x = math.sqrt(3.0) * side_length * (column + 0.5 * (row % 2))
+    y = 1.5 * side_length * row
+    return np.array([x, y]) + build_regular_polygon(6, side_length, math.pi / 6.0)
 
 
 def find_shared_side(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Return the ends of the side that two hexagons have in common, or None if they are not neighbors."""
     distances = np.linalg.norm(first[:, None] - second, axis=2)
-    shared_corners = first[(distances < 1e-6).any(axis=1)]
+    shared_corners = first[(distances < MAX_CORNER_ERROR_M).any(axis=1)]
     if len(shared_corners) < 2:
         return None
     return shared_corners[0], shared_corners[1]
@@ -272,10 +281,10 @@ def draw_star(rng: np.random.Generator) -> FloorPlan:
     wall_angles = rotation + math.tau * np.arange(tips) / tips
     tip_angles = wall_angles + math.pi / tips
     boundary = np.empty((2 * tips, 2))
-    boundary[::2] = compute_points(inner_radius, wall_angles)
-    boundary[1::2] = compute_points(radius, tip_angles)
-    plaza_corners = compute_points(plaza_radius, wall_angles)
-    wall_starts = compute_points(inner_radius + WALL_OVERLAP_M, wall_angles)
+    boundary[::2] = to_cartesian(inner_radius, wall_angles)
+    boundary[1::2] = to_cartesian(radius, tip_angles)
+    plaza_corners = to_cartesian(plaza_radius, wall_angles)
+    wall_starts = to_cartesian(inner_radius + WALL_OVERLAP_M, wall_angles)
     walls = [np.array(ends) for ends in zip(wall_starts, plaza_corners, strict=True)]
     for tip in range(tips):
         door_width = rng.uniform(*STAR_DOORS_M)
@@ -297,7 +306,7 @@ def draw_river(rng: np.random.Generator) -> FloorPlan:
     x = np.linspace(0.0, length, MEANDER_POINTS)
     y = amplitude * np.sin(wave_number * x + phase)
     spaces = [LineString(np.column_stack([x, y])).buffer(width / 2.0, quad_segs=6)]
-    for side in (-1.0, 1.0):
+    for bank in (-1.0, 1.0):
         turn = rng.choice([-1.0, 1.0]) * rng.uniform(*BAY_TURNS)
         first_mouth = rng.uniform(0.0, 0.6) * bay_distance
         for mouth_x in np.arange(first_mouth, length, bay_distance):
@@ -305,7 +314,7 @@ def draw_river(rng: np.random.Generator) -> FloorPlan:
             bay_length = rng.uniform(*BAY_LENGTHS_M)
             bay_width = rng.uniform(*BAY_WIDTHS_M)
             mouth_y = amplitude * math.sin(wave_number * mouth_x + phase)
-            bay = np.array([mouth_x, mouth_y]) + bend_line(bay_length, bay_turn) * [1.0, side]
+            bay = np.array([mouth_x, mouth_y]) + bend_line(bay_length, bay_turn) * [1.0, bank]
             spaces.append(LineString(bay).buffer(bay_width / 2.0, quad_segs=4))
     water = shapely.simplify(shapely.union_all(spaces), SHORE_TOLERANCE_M)
     # Rock that is enclosed by bays that meet is left out.
@@ -337,11 +346,11 @@ def extend_wall(start: FloatArray, end: FloatArray) -> FloatArray:
 
 def build_regular_polygon(sides: int, radius: float, rotation: float) -> FloatArray:
     """Build the corners of a regular polygon around the origin, (sides, 2) m."""
-    return compute_points(radius, rotation + math.tau * np.arange(sides) / sides)
+    return to_cartesian(radius, rotation + math.tau * np.arange(sides) / sides)
 
 
-def compute_points(radii: FloatArray | float, angles: FloatArray) -> FloatArray:
-    """Return points with the given polar coordinates, (k, 2) m."""
+def to_cartesian(radii: FloatArray | float, angles: FloatArray) -> FloatArray:
+    """Convert polar to Cartesian coordinates, (k, 2) m."""
     return np.column_stack([radii * np.cos(angles), radii * np.sin(angles)])
 
 
