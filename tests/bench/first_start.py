@@ -195,8 +195,8 @@ def is_dark(screen: Screen) -> bool:
     return float(np.mean(green)) < 128.0
 
 
-def has_changed(screen: Screen, *, was_dark: bool) -> bool:
-    """Return whether the screen has become dark or bright since it was looked at."""
+def has_switched_theme(screen: Screen, *, was_dark: bool) -> bool:
+    """Return whether a screen that was dark is now bright, or the other way round."""
     return is_dark(screen) != was_dark
 
 
@@ -208,7 +208,7 @@ def measure_responses(screen: Screen, duration_s: float) -> list[float]:
         was_dark = is_dark(screen)
         start_time = time.monotonic()
         screen.press(THEME_KEY)
-        wait_until(partial(has_changed, screen, was_dark=was_dark))
+        wait_until(partial(has_switched_theme, screen, was_dark=was_dark))
         times.append(time.monotonic() - start_time)
         time.sleep(KEY_INTERVAL_S)
     return times

@@ -86,7 +86,7 @@ def execute_scenario(
     # The simulation takes longest, so its record is saved before the evaluation starts.
     result.save_progress()
     run = evaluate_record(
-        record, cost, fewer_samples=is_partial_record(record, scenario), quiet=settings.hide_progress
+        record, cost, limit_samples=is_partial_record(record, scenario), quiet=settings.hide_progress
     )
     save_numbers(run, result.staging / subfolder, settings.lattice)
     result.save_progress()
@@ -117,7 +117,7 @@ def is_partial_record(record: Record, scenario: Scenario) -> bool:
     return round(float(record.time[-1]) / scenario.dt) < scenario.steps
 
 
-def evaluate_record(record: Record, cost: CoverageCost, *, fewer_samples: bool, quiet: bool) -> Run:
+def evaluate_record(record: Record, cost: CoverageCost, *, limit_samples: bool, quiet: bool) -> Run:
     """Compute the coverage cost along a record, and its summary.
 
     Parameters
@@ -126,7 +126,7 @@ def evaluate_record(record: Record, cost: CoverageCost, *, fewer_samples: bool, 
         The run.
     cost : CoverageCost
         Cost of the record's map.
-    fewer_samples : bool
+    limit_samples : bool
         Whether to evaluate only about `MAX_SAMPLES_AFTER_INTERRUPTION` steps, so that an interrupted command
         ends soon.
     quiet : bool
@@ -138,7 +138,7 @@ def evaluate_record(record: Record, cost: CoverageCost, *, fewer_samples: bool, 
     """
     rate = DEFAULT_RATE_HZ
     end = float(record.time[-1])
-    if fewer_samples and end > 0:
+    if limit_samples and end > 0:
         rate = min(rate, MAX_SAMPLES_AFTER_INTERRUPTION / end)
     samples = len(select_sampled_steps(record, rate))
     with show_progress("coverage cost", samples, quiet=quiet) as update:

@@ -91,18 +91,18 @@ def enclose_boxes(boxes: Iterable[Box]) -> Box:
 
 
 def extract_polygons(
-    geometry: shapely.Geometry, replaced: Obstacle | None = None
+    geometry: shapely.Geometry, original: Obstacle | None = None
 ) -> tuple[PolygonObstacle, ...]:
     """Convert the polygons of a geometry to obstacles, the largest first.
 
-    They have the name and the path of the obstacle that they replace, if there is one. Coordinates are
+    They have the name and the path of the original obstacle, if there is one. Coordinates are
     rounded to tenths of a millimeter. Tiny polygons and holes are dropped.
     """
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_tiny(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
-    name = None if replaced is None else replaced.name
-    path = None if replaced is None else replaced.path
+    name = None if original is None else original.name
+    path = None if original is None else original.path
     polygons = []
     for part in map(shapely.orient_polygons, parts):
         rings = [part.exterior, *(hole for hole in part.interiors if not _is_tiny(hole))]

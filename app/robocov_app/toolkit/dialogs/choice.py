@@ -247,7 +247,7 @@ class Choice(Dialog):
         self._reveal_highlighted(count)
 
     def _reveal_highlighted(self, count: int) -> None:
-        """Scroll the highlighted one of some lines into view, with no empty space below the last line."""
+        """Scroll so that the highlighted line is visible and no space stays empty below the last line."""
         top = min(self.top, max(count - self._visible_count, 0))
         self.top = min(max(top, self.highlighted - self._visible_count + 1), self.highlighted)
 

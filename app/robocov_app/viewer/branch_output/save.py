@@ -135,7 +135,7 @@ class _BranchWriter:
         """Evaluate the cost of a record. As in the window, failed robots are not obstacles for the cost."""
         bare = replace(record, environment=cost.environment)
         run = evaluate_record(
-            bare, cost, fewer_samples=self.interruption.requested, quiet=self.settings.hide_progress
+            bare, cost, limit_samples=self.interruption.requested, quiet=self.settings.hide_progress
         )
         return Run(record, run.history, summarize(record, run.history))
 

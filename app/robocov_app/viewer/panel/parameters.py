@@ -13,7 +13,7 @@ from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 SLIDER_SPAN = 30.0  # a slider ranges from 1 / 30 of the default to 30 times the default
-MAX_STEPS = 100  # the slider of a whole number with at most this many steps is linear
+MAX_LINEAR_STEPS = 100  # the slider of a whole number with at most this many steps is linear
 NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"
 NO_LIMIT_TEXTS = ("unlimited", "none", "null", "no limit", "inf", "∞", "")
 MAX_BASIC_GAINS = 4
@@ -174,7 +174,7 @@ class NumberParameter:
     @property
     def slider_step(self) -> float:
         """Distance between the possible positions of the slider; 0 if any position is possible."""
-        if self.is_whole and 0.0 < self.high - self.low <= MAX_STEPS:
+        if self.is_whole and 0.0 < self.high - self.low <= MAX_LINEAR_STEPS:
             return 1.0 / (self.high - self.low)
         return 0.0
 
