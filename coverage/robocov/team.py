@@ -262,11 +262,12 @@ class Team:
             "viscosity": viscosity,
             "sensing_range": sensing_range,
             "communication_range": communication_range,
-            "track_width": _choose_track_width(kinematics, track_width, radius),
+            "track_width": track_width,
             "turning_rate": turning_rate,
         }
-        columns = {name: np.full(n, _to_number(name, value)) for name, value in values.items()}
-        return cls(**columns)
+        numbers = {name: _to_number(name, value) for name, value in values.items()}
+        numbers["track_width"] = _choose_track_width(kinematics, numbers["track_width"], numbers["radius"])
+        return cls(**{name: np.full(n, number) for name, number in numbers.items()})
 
     @classmethod
     def concatenate(cls, teams: Sequence[Team]) -> Team:
@@ -381,10 +382,11 @@ def _to_number(name: str, value: object) -> float:
 def _choose_track_width(kinematics: str | None, track_width: float, radius: float) -> float:
     """Return the track width of robots with the given kinematics, m; None keeps `track_width`."""
     if kinematics not in (None, *KINEMATICS):
-        raise ParameterError(f"team.{describe_unknown_name('kinematics', str(kinematics), KINEMATICS)}")
+        message = describe_unknown_name("kinematics", str(kinematics), KINEMATICS)
+        raise ParameterError(f"team.kinematics: {message}")
     if kinematics == POINT:
         return 0.0
-    if kinematics == UNICYCLE and not track_width:
+    if kinematics == UNICYCLE and track_width == 0.0:
         return DEFAULT_TRACK_PER_RADIUS * radius
     return track_width
 

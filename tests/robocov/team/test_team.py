@@ -26,6 +26,16 @@ def test_a_homogeneous_team_has_one_value_of_each_parameter(radius: object) -> N
         Team.homogeneous(2, radius=radius)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("radius", "large"), ("radius", None), ("track_width", [0.1, 0.2]), ("track_width", "wide")],
+)
+@pytest.mark.parametrize("kinematics", ["point", "unicycle"])
+def test_a_size_of_a_robot_is_a_number_with_any_kinematics(kinematics: str, name: str, value: object) -> None:
+    with pytest.raises(ParameterError, match=rf"team\.{name}: expected a number, got"):
+        Team.homogeneous(2, kinematics=kinematics, **{name: value})  # type: ignore[arg-type]
+
+
 @given(
     st.lists(
         st.tuples(st.floats(0.01, 1), st.one_of(st.just(np.inf), st.floats(0, 50))), min_size=1, max_size=9
