@@ -11,6 +11,7 @@ from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Environment
 from robocov.errors import (
     ParameterError,
+    StartError,
     format_bound,
     format_count,
     format_position,
@@ -19,11 +20,15 @@ from robocov.errors import (
     require_number,
 )
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 MIN_DT_S = 1e-4
 """Minimum control period."""
 MAX_DT_S = 1.0
 """Maximum control period."""
+MAX_START_VELOCITY_M_S = 1e4
+"""Maximum component of a robot's velocity at the start, ten times the limit of its maximum speed. The physics
+divides the steps of faster robots into so many substeps that a run would hardly advance."""
 
 
 def check_dt(dt: float) -> None:
@@ -94,6 +99,25 @@ def check_team(team: Any, robot_count: int) -> Team:
         expected = format_count(robot_count, "robot")
         raise ParameterError(f"team: expected {expected}, one for each start, got {len(team)}")
     return team
+
+
+def check_start_velocities(velocities: FloatArray) -> None:
+    """Check the velocities of robots at the start.
+
+    Parameters
+    ----------
+    velocities : (n, 2) array, m/s
+        Initial velocities.
+
+    Raises
+    ------
+    StartError
+        If a component of a velocity exceeds `MAX_START_VELOCITY_M_S`.
+    """
+    for i in np.flatnonzero((np.abs(velocities) > MAX_START_VELOCITY_M_S).any(axis=1)).tolist():
+        maximum = format_bound(MAX_START_VELOCITY_M_S)
+        expected = f"expected numbers from -{maximum} to {maximum} m/s"
+        raise StartError(f"velocities[{i}]: {expected}, got {velocities[i].tolist()}")
 
 
 def check_conditions(conditions: Any, robot_count: int) -> Conditions | None:

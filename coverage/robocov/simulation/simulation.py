@@ -27,6 +27,7 @@ from robocov.simulation.checks import (
     check_conditions,
     check_dt,
     check_joins,
+    check_start_velocities,
     check_team,
     count_steps,
 )
@@ -87,7 +88,7 @@ class Simulation:
     Raises
     ------
     StartError
-        If a robot would start in a wall or in another robot.
+        If a robot would start in a wall or in another robot, or faster than `checks.MAX_START_VELOCITY_M_S`.
     ParameterError
         If the control period is out of range, team and starts differ in size, the conditions refer to other
         robots, or the controller cannot be used.
@@ -134,6 +135,8 @@ class Simulation:
         self._steps = state.steps
         if not state.is_computed:
             check_joins(environment, self.conditions)
+            if state.velocities is not None:
+                check_start_velocities(state.velocities)
             _check_robots_fit(environment, self.team, state, self.conditions, self.time)
         known_map = get_known_map(environment, self.conditions)
         self._controller_caller = ControllerCaller(controller, known_map, self.time)

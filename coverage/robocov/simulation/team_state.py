@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from robocov.errors import StartError, quote, to_floats
+from robocov.errors import ParameterError, StartError, is_number, quote, to_floats
 from robocov.typing import FloatArray
+from robocov.world.free_positions import require_finite_starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +35,9 @@ class TeamState:
     Raises
     ------
     StartError
-        If there is no robot, an array does not contain two numbers for each robot, or velocities or steering
-        are not finite. A simulation checks whether positions are finite when it is built.
+        If there is no robot, or an array does not contain two finite numbers for each robot.
+    ParameterError
+        If the number of steps is not a whole number of at least 0.
 
     See Also
     --------
@@ -63,6 +66,7 @@ class TeamState:
             raise StartError(
                 f"starts: expected an array of shape (n, 2) with n >= 1, got shape {positions.shape}"
             )
+        require_finite_starts(positions)
         object.__setattr__(self, "positions", positions)
         if self.velocities is not None:
             velocities = to_floats("velocities", self.velocities, "[x, y] of each robot in m/s", StartError)
@@ -73,6 +77,8 @@ class TeamState:
             steering = to_floats("steering", self.steering, f"{columns} of each robot", StartError)
             _check_rows("steering", steering, positions.shape, columns)
             object.__setattr__(self, "steering", steering)
+        if not is_number(self.steps, Integral) or self.steps < 0:
+            raise ParameterError(f"steps: expected a whole number of at least 0, got {quote(self.steps)}")
 
     def __len__(self) -> int:
         """Return the number of robots."""

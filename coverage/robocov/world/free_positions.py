@@ -150,6 +150,23 @@ def find_free_position(
     return x, y
 
 
+def require_finite_starts(positions: FloatArray) -> None:
+    """Raise an error if a position is not finite.
+
+    Parameters
+    ----------
+    positions : (n, 2) array, m
+        Positions at which the robots start.
+
+    Raises
+    ------
+    StartError
+        If a position is not finite. The message names the first such robot.
+    """
+    for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
+        raise StartError(f"starts[{i}]: expected finite numbers, got {positions[i].tolist()}")
+
+
 def require_free_starts(
     environment: Environment,
     positions: FloatArray,
@@ -183,8 +200,7 @@ def require_free_starts(
     if is_working is None:
         is_working = np.ones(len(positions), dtype=bool)
     is_present = is_working if is_failed is None else is_working | is_failed
-    for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
-        raise StartError(f"starts[{i}]: expected finite numbers, got {positions[i].tolist()}")
+    require_finite_starts(positions)
     wall_distances = _compute_wall_distances(environment, positions)
     for i in np.flatnonzero(is_working & (wall_distances < team.radius - tolerance)).tolist():
         start = f"starts[{i}] = {format_position(positions[i, 0], positions[i, 1])}"

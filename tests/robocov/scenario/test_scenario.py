@@ -162,6 +162,7 @@ def test_check_accepts_what_can_run() -> None:
         ({"robots": 3, "team": Team.homogeneous(2)}, r"robots: expected 2 as in the team, got 3"),
         ({"team": 3}, r"team: expected a Team"),
         ({"starts": [[1, 1]], "robots": 2}, r"starts: expected one for each of 2 robots, got 1"),
+        ({"starts": [[1, float("nan")]]}, r"starts\[0\]: expected finite numbers"),
         ({"velocities": [[1, 1]]}, r"velocities: expected starts as well"),
         ({"steering": [[0, 0]]}, r"steering: expected starts as well"),
         ({"dt": 2.0}, r"dt: expected"),

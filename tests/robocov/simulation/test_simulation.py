@@ -381,7 +381,23 @@ def test_a_state_has_two_finite_numbers_for_each_robot() -> None:
         TeamState(positions, velocities=np.zeros((1, 2)))
     with pytest.raises(StartError, match=r"steering: expected finite \[heading, turning rate\]"):
         TeamState(positions, steering=np.full((2, 2), np.inf))
+    with pytest.raises(StartError, match=r"starts\[1\]: expected finite numbers, got \[3.0, nan\]"):
+        TeamState(np.array([[2.0, 2.0], [3.0, np.nan]]))
     assert len(TeamState(positions)) == 2
+
+
+def test_robots_that_are_too_fast_to_be_simulated_are_rejected(empty: Environment) -> None:
+    positions = np.array([[2.0, 2.0], [3.0, 3.0]])
+    state = TeamState(positions, velocities=np.array([[0.0, 0.0], [0.0, -1e30]]))
+    message = r"velocities\[1\]: expected numbers from -10000 to 10000 m/s, got \[0.0, -1e\+30\]"
+    with pytest.raises(StartError, match=message):
+        Simulation(empty, Rapf(), state)
+
+
+@pytest.mark.parametrize("steps", [-1, 1.5, "3", None])
+def test_the_number_of_steps_before_a_state_is_a_whole_number(steps: object) -> None:
+    with pytest.raises(ParameterError, match="steps: expected a whole number of at least 0, got"):
+        TeamState(np.array([[2.0, 2.0]]), steps=steps)  # type: ignore[arg-type]
 
 
 def test_team_and_starts_must_agree(empty: Environment) -> None:
