@@ -25,7 +25,7 @@ class Neighbors:
     robot_count : int
         Number of robots n.
     ranges : (n,) array or None, m
-        Communication ranges; None if all robots communicate at any distance.
+        Communication ranges; None if they do not limit the distance of neighbors.
     indptr : (n + 1,) int array or None
         ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbors of robot i. None if the graph is
         complete.
@@ -134,12 +134,19 @@ class Neighbors:
         robot_count = 0
         robots = []
         neighbors = []
+        ranges = []
         for graph in graphs:
             robot, neighbor = graph.list_pairs()
             robots.append(robot + robot_count)
             neighbors.append(neighbor + robot_count)
+            ranges.append(np.full(graph.robot_count, np.inf) if graph.ranges is None else graph.ranges)
             robot_count += graph.robot_count
-        return cls.from_pairs(robot_count, np.concatenate(robots), np.concatenate(neighbors))
+        return cls.from_pairs(
+            robot_count,
+            np.concatenate(robots),
+            np.concatenate(neighbors),
+            None if all(graph.ranges is None for graph in graphs) else np.concatenate(ranges),
+        )
 
     @property
     def is_complete(self) -> bool:

@@ -57,6 +57,16 @@ def test_infinite_ranges_give_the_complete_graph() -> None:
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
 
 
+def test_combined_graphs_have_the_ranges_of_all_robots() -> None:
+    positions = np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]])
+    limited = Neighbors.from_ranges(positions, np.array([2.0, 3.0, 4.0]))
+    complete = Neighbors(2)
+    combined = Neighbors.combine([limited, complete])
+    assert [combined.list_neighbors(i).tolist() for i in range(5)] == [[1], [0], [], [4], [3]]
+    np.testing.assert_array_equal(combined.ranges, [2.0, 3.0, 4.0, np.inf, np.inf])
+    assert Neighbors.combine([complete, complete]).ranges is None
+
+
 @pytest.mark.parametrize("communication_range", [10.0, np.inf])
 def test_neighbors_at_exactly_the_reach_are_near(communication_range: float) -> None:
     positions = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.5]])
