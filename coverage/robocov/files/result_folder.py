@@ -359,16 +359,19 @@ def require_result(folder: Path, expected: str, files: Sequence[str]) -> None:
     Raises
     ------
     InputError
-        If the folder does not exist, or contains none of the files.
+        If the folder does not exist or cannot be read, or contains none of the files.
     """
-    if any((folder / file).is_file() for file in files):
-        return
-    if folder.is_dir():
+    try:
+        if any((folder / file).is_file() for file in files):
+            return
+        actual = describe_path(folder)
+    except OSError as error:
+        # The user may have no permission to read the folder, or its name may be too long.
+        raise InputError(f"{folder}: cannot be read: {describe_error(error)}") from error
+    if actual == "a folder":
         *first_files, last_file = files
         listing = f"{', '.join(first_files)} or {last_file}" if first_files else last_file
         actual = f"a folder without {listing}"
-    else:
-        actual = describe_path(folder)
     raise InputError(f"{folder}: expected {expected}, got {actual}")
 
 

@@ -225,6 +225,12 @@ def test_errors_name_files_that_are_not_tables(
     assert str(caught.value).startswith(str(tmp_path)) and message in str(caught.value)
 
 
+def test_errors_name_a_folder_whose_name_is_too_long() -> None:
+    name = 1000 * "a"
+    with pytest.raises(InputError, match=f"^{name}: cannot be read: "):
+        read_results(name)
+
+
 def test_errors_name_a_table_that_was_emptied_after_it_was_opened(folder: Path) -> None:
     results = read_results(folder)
     (folder / "results.csv").write_bytes(b"")
