@@ -364,6 +364,26 @@ def check_gains(controller: Any) -> None:
             declared.validate(getattr(controller, name), controller_name)
 
 
+def require_gain_mapping(values: object) -> None:
+    """Raise a ParameterError unless values are a mapping whose keys are names.
+
+    Parameters
+    ----------
+    values : object
+        Values of gains by name. Neither the names nor the values are checked.
+
+    Raises
+    ------
+    ParameterError
+        If this is not a mapping, or one of its keys is not a str.
+    """
+    if not isinstance(values, Mapping):
+        raise ParameterError(f"gains: expected a mapping of names to values, got {quote(values)}")
+    for name in values:
+        if not isinstance(name, str):
+            raise ParameterError(f"gains: expected names as keys, got {quote(name)}")
+
+
 def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any:
     """Create a controller of a class.
 
@@ -383,14 +403,11 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
         If `values` is not a mapping, a gain is unknown (the message suggests the most similar name), a value
         is not allowed, or the constructor of a user's class raises an error.
     """
-    if not isinstance(values, Mapping):
-        raise ParameterError(f"gains: expected a mapping of names to values, got {quote(values)}")
+    require_gain_mapping(values)
     gains = get_gains(kind)
     controller_name = getattr(kind, "name", kind.__name__)
     checked_values = {}
     for given_name, value in values.items():
-        if not isinstance(given_name, str):
-            raise ParameterError(f"gains: expected names as keys, got {quote(given_name)}")
         if not gains:
             path = f"{controller_name}.{given_name}"
             raise ParameterError(f"{path}: controller {controller_name!r} has no gains")

@@ -23,7 +23,7 @@ from robocov.controllers import (
     get_recorded_name,
     make_controller,
 )
-from robocov.controllers.gains import Value, get_gain_values, to_plain_value
+from robocov.controllers.gains import Value, get_gain_values, require_gain_mapping, to_plain_value
 from robocov.controllers.individual import require_controller, unwrap_controller
 from robocov.controllers.user_modules import ControllerSource, provide_modules
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_S, DEFAULT_ROBOTS
@@ -106,6 +106,8 @@ class Scenario:
     ------
     ParameterError
         If an argument cannot be used.
+    StartError
+        If given starts, velocities or steering cannot be used.
     MapError
         If the map cannot be read.
 
@@ -188,6 +190,8 @@ class Scenario:
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)  # Attributes of a frozen object cannot be assigned.
+        if source is not None:
+            require_type("source", source, ControllerSource, "a ControllerSource")
         if conditions is not None:
             require_type("conditions", conditions, Conditions, "Conditions")
             conditions.check_team(len(self.team))
@@ -245,7 +249,8 @@ class Scenario:
         **changes
             Parameters of `Scenario`. A new controller has its default gains unless `gains` is given
             as well. A new number of robots replaces the team with one that has the default
-            properties, and requires new `starts` if these were given.
+            properties, and requires new `starts` if these were given. With a new number of robots or
+            sampled starts, the robots are at rest unless `velocities` is given as well.
 
         Returns
         -------
@@ -285,6 +290,11 @@ class Scenario:
             arguments["source"] = None
         if "robots" in changes:
             arguments["team"] = None
+        has_sampled_starts = changes.get("starts", self.given_starts) is None
+        if "robots" in changes or has_sampled_starts:
+            # The velocities and headings are those of the robots at the earlier starts.
+            arguments["velocities"] = None
+            arguments["steering"] = None
         return Scenario(**(arguments | changes))
 
     def build_controller(self) -> Controller:
@@ -687,7 +697,9 @@ def _describe_controller(
             # This checks the name and the gains. A controller in a file ("file:class") is only checked when
             # it is needed, because that runs the code of the file.
             make_controller(controller, gains)
-        plain_gains = {name: to_plain_value(value) for name, value in (gains or {}).items()}
+        given_gains = gains or {}
+        require_gain_mapping(given_gains)
+        plain_gains = {name: to_plain_value(value) for name, value in given_gains.items()}
         _require_finite_gains(plain_gains)
         return {"controller": controller, "gains": plain_gains, "_controller_object": None}
     if gains:

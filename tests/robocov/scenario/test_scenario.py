@@ -156,7 +156,10 @@ def test_check_accepts_what_can_run() -> None:
         ({"controller": "lloid"}, r"unknown controller"),
         ({"gains": {"k": 1.0}}, r"unknown gain 'k'"),
         ({"controller": Homing(pull=float("inf"))}, r"gains: pull: expected a finite number, got inf"),
+        ({"controller": "mine.py:Mine", "gains": "k_rep"}, r"gains: expected a mapping"),
+        ({"controller": "mine.py:Mine", "gains": {1: 0.3}}, r"gains: expected names as keys, got 1"),
         ({"controller": rc.Rapf(), "gains": {"k_rep": 1.0}}, r"gains: expected none"),
+        ({"source": "class Mine: ..."}, r"source: expected a ControllerSource"),
         ({"controller": rc.Rapf}, r"controller: expected a controller"),
         ({"robots": 0}, r"robots: expected a whole number of at least 1"),
         ({"robots": 3, "team": Team.homogeneous(2)}, r"robots: expected 2 as in the team, got 3"),
@@ -204,6 +207,24 @@ def test_another_controller_has_its_default_gains() -> None:
     assert scenario.replace(duration=2.0).gains == {"k_rep": 0.3}
     assert scenario.replace(controller="lloyd").gains == {}
     assert scenario.replace(robots=5).robots == 5
+
+
+def test_other_robots_and_sampled_starts_do_not_keep_the_velocities() -> None:
+    team = Team.homogeneous(2, kinematics="unicycle")
+    moving = rc.Scenario(
+        ROOM,
+        team=team,
+        starts=[[1.0, 1.0], [2.0, 2.0]],
+        velocities=[[0.1, 0.0], [0.0, 0.0]],
+        steering=[[0.0, 0.0], [1.0, 0.0]],
+    )
+    more = moving.replace(robots=3, starts=[[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]])
+    assert more.velocities is None and more.steering is None
+    sampled = moving.replace(starts=None)
+    assert sampled.velocities is None and sampled.steering is None
+    shifted = moving.replace(starts=[[1.5, 1.0], [2.5, 2.0]])
+    np.testing.assert_array_equal(shifted.velocities, moving.velocities)
+    np.testing.assert_array_equal(shifted.steering, moving.steering)
 
 
 @settings(max_examples=count_examples(40))
