@@ -363,8 +363,10 @@ class Conditions:
             arguments: dict[str, Any] = {**numbers, "failures": failures, "joins": joins}
             density = document.get("density", "known")
             return cls(**arguments, seed=document["seed"], density=density)
-        except (KeyError, TypeError) as error:
-            raise ParameterError(f"conditions: cannot be read ({error!r})") from error
+        except KeyError as error:
+            raise ParameterError(f"conditions: missing key {error}") from error
+        except TypeError as error:
+            raise ParameterError(f"conditions: cannot be read: {error}") from error
 
     def __repr__(self) -> str:
         arguments = []

@@ -202,11 +202,13 @@ def test_an_unknown_density_is_not_ideal() -> None:
 
 
 def test_unreadable_conditions_are_rejected() -> None:
-    with pytest.raises(ParameterError, match="conditions: cannot be read"):
+    with pytest.raises(ParameterError, match=r"^conditions: missing key 'delay_s'$"):
         Conditions.from_dict({"loss": 0.5})
     broken = Conditions().to_dict() | {"failures": [{"robot": 1}]}
-    with pytest.raises(ParameterError, match="conditions: cannot be read"):
+    with pytest.raises(ParameterError, match=r"^conditions: missing key 'time_s'$"):
         Conditions.from_dict(broken)
+    with pytest.raises(ParameterError, match=r"^conditions: cannot be read: "):
+        Conditions.from_dict(Conditions().to_dict() | {"failures": 3})
 
 
 def test_events_are_parsed_from_text() -> None:
