@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
+from robocov.files.strictjson import is_existing_file
 
 MODULE_PREFIX = "robocov_user_"
 """Prefix of the names of modules that are loaded from users' files."""
@@ -159,7 +160,7 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
     source_name = f"controller {quote(name)}"
     if not class_name or not file.endswith(".py"):
         raise ParameterError(f"{source_name}: expected a file and a class, as in mine.py:MyController")
-    if source is None and not Path(file).is_file():
+    if source is None and not is_existing_file(Path(file)):
         raise ParameterError(f"{file}: no such file")
     try:
         module = _load_module(file, source)

@@ -1,7 +1,6 @@
 """Reading of maps from files, texts and JSON documents, and the bundled maps."""
 
 import json
-from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from robocov.errors import (
     quote_json,
     to_one_line,
 )
-from robocov.files.strictjson import locate_issues, parse_json, read_bytes, require_json
+from robocov.files.strictjson import is_existing_file, locate_issues, parse_json, read_bytes, require_json
 from robocov.mapfile.density_images import read_gray_levels, read_image_file
 from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
 from robocov.mapfile.rules import check_rules
@@ -105,9 +104,8 @@ def find_map_file(source: str | Path) -> Path:
     bundled_maps = list_bundled_maps()
     if source in bundled_maps:
         return bundled_maps[source]
-    with suppress(OSError):  # The name may be too long for a file.
-        if Path(source).is_file():
-            return Path(source)
+    if is_existing_file(Path(source)):
+        return Path(source)
     raise MapError(describe_unknown_name("map", source, bundled_maps))
 
 

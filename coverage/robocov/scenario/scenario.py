@@ -6,7 +6,6 @@ import inspect
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
@@ -43,7 +42,7 @@ from robocov.errors import (
     require_type,
 )
 from robocov.files.documents import check_header, validate_document
-from robocov.files.strictjson import parse_json, read_bytes
+from robocov.files.strictjson import is_existing_file, parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov.mapfile import find_map_file, from_json, list_bundled_maps, load_map, to_json
 from robocov.record import Record, Recorder
@@ -725,12 +724,9 @@ def _load_environment(content: str | dict[str, Any], source_name: str, folder: P
     """Return the map of a document, which contains the map itself, its name, or the path of its file."""
     if not isinstance(content, str):
         return from_json(content, f"{source_name}: map", folder)
-    if folder is not None and content not in list_bundled_maps():
-        is_file = False
-        with suppress(OSError):  # The name may be too long for a file.
-            is_file = (folder / content).is_file()
-        if is_file:
-            return load_map(folder / content)
+    is_name_of_bundled_map = content in list_bundled_maps()
+    if folder is not None and not is_name_of_bundled_map and is_existing_file(folder / content):
+        return load_map(folder / content)
     try:
         path = find_map_file(content)
     except MapError as error:

@@ -94,6 +94,7 @@ def test_mistakes_in_the_name_of_a_file_or_class_are_explained(controller_file: 
         ),
         (f"{controller_file}:Thawed", r"mine\.py: Thawed: expected a frozen dataclass"),
         (f"{controller_file.parent}/no.py:Mine", r"no\.py: no such file"),
+        (f"{1000 * 'a'}.py:Mine", r"a\.py: no such file"),
         (f"{controller_file}", "expected a file and a class"),
     ]:
         with pytest.raises(ParameterError, match=message):

@@ -6,7 +6,6 @@ single value, a list of values or a table, and the message must describe the alt
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +20,7 @@ from robocov.errors import (
     quote,
     to_one_line,
 )
-from robocov.files.strictjson import parse_toml, read_bytes
+from robocov.files.strictjson import is_existing_file, parse_toml, read_bytes
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.sweep.study.gains import NO_LIMIT
 from robocov_app.sweep.study.sampling import Range, Sampling, SamplingMethod, Scale
@@ -461,8 +460,7 @@ def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> li
     if not entry.endswith(".json"):
         raise InputError(describe_unknown_name("map", entry, bundled))
     path = folder / entry
-    # Unlike Path.is_file, this does not raise if the name is too long for a file.
-    is_pattern = "*" in entry and not os.path.isfile(path)  # noqa: PTH113
+    is_pattern = "*" in entry and not is_existing_file(path)
     if not is_pattern:
         return [(path.stem, path)]
     if Path(entry).is_absolute():
