@@ -207,7 +207,7 @@ class MeasurementExchange:
         return replace(self, sent_times=sent_times, allowances=allowances), messages
 
     def _count_measurements_to_send(self, seen: Observations, robot: int) -> int:
-        """Return how many measurements a robot with an allowance sends in this step: at least one."""
+        """Return the number of measurements that a robot with an allowance sends in this step, at least 1."""
         allowance = int(self.allowances[robot])
         if seen.send_limits is None:
             return allowance
@@ -223,7 +223,7 @@ class MeasurementMemory:
 
     team: Team
     measurements: FloatArray
-    """(n, s) Measurements of φ in the squares that each robot knows, also those of others; nan if unknown."""
+    """(n, s) Measurements of φ in the squares that each robot knows, own and received; nan if unknown."""
     measurement_exchange: MeasurementExchange
     goals: FloatArray | None = None
     """(n, 2) m, goals in the last plan; None before the first one."""

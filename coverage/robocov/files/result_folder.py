@@ -376,7 +376,7 @@ def require_result(folder: Path, expected: str, files: Sequence[str]) -> None:
 
 
 def describe_path(path: Path) -> str:
-    """Return what a path leads to, for an error message.
+    """Describe the kind of a path, for an error message.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class MapKind:
     build_obstacles : callable
         Builds the obstacles; see `ObstacleBuilder`.
     description : str
-        What its maps look like, in one line.
+        Description of its maps on one line.
     obstacle_name : str
         Name of its obstacles in the plural, such as "rooms".
     default_obstacle_count : int

@@ -109,7 +109,7 @@ def _compute_clearances_by_queries(record: Record) -> FloatArray:
 
 
 def count_contacts(record: Record, clearances: FloatArray) -> int:
-    """Count how many times a robot came into contact with a wall or with another robot.
+    """Count the contacts of robots with walls and with each other.
 
     Parameters
     ----------

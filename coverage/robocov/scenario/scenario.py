@@ -225,7 +225,7 @@ class Scenario:
         return round(self.duration / self.dt)
 
     def check(self) -> None:
-        """Check what is otherwise only checked when a run starts, except for given starts.
+        """Check the controller, sampled starts and joins, which a run checks only when it starts.
 
         If the controller is in a file, this runs the code of the file.
 

@@ -341,9 +341,9 @@ def _write_bisector(curve: FloatArray, pairs: FloatArray, neighbor: float) -> No
 
 @kernel
 def _write_side(curve: FloatArray, edge: FloatArray, sides: FloatArray, point: FloatArray) -> None:
-    """Write the normal of the side of the region on which an edge lies, and the edge's distance, to a curve.
+    """Write to a curve which side of the region an edge lies on.
 
-    The distance is that of the line of the edge from the generator.
+    The curve receives the normal of this side, and the distance of the line of the edge from the generator.
     """
     middle_x = 0.5 * (edge[EDGE_START_X] + edge[EDGE_END_X])
     middle_y = 0.5 * (edge[EDGE_START_Y] + edge[EDGE_END_Y])
