@@ -99,6 +99,10 @@ def test_circles_and_ellipses_are_read(tmp_path: Path) -> None:
     oval = read_solid_area(tmp_path, '<ellipse cx="500" cy="300" rx="200" ry="50"/>')
     assert oval.area == pytest.approx(math.pi * 2 * 0.5, abs=oval.length * 1e-3)
     assert oval.bounds == pytest.approx((3, 2.5, 7, 3.5), abs=1e-3)
+    # A radius that is missing or "auto" equals the other one.
+    for radii in ('rx="50"', 'rx="auto" ry="50"', 'rx="50" ry="auto"'):
+        circle = read_solid_area(tmp_path, f'<ellipse cx="500" cy="300" {radii}/>')
+        assert circle.symmetric_difference(exact).area < circle.length * 1e-3
     same = read_solid_area(tmp_path, '<circle cx="125" cy="300" r="50" transform="scale(4 1)"/>')
     assert same.symmetric_difference(oval).area < oval.length * 1e-3
     rounded = read_solid_area(tmp_path, '<rect x="100" y="100" width="200" height="100" rx="20"/>')

@@ -249,17 +249,22 @@ def _format_line(element: Element) -> str:
     return f"line {element.line}"
 
 
+def _parse_radii(element: Element, state: ElementState) -> tuple[float, float]:
+    """Return the radii of an ellipse or a round corner; one that is missing or "auto" equals the other."""
+    rx, ry = state.parse_lengths(element, "rx", "ry")
+    if element.attributes.get("rx", "auto").strip() == "auto":
+        return ry, ry
+    if element.attributes.get("ry", "auto").strip() == "auto":
+        return rx, rx
+    return rx, ry
+
+
 def _compute_ellipse(element: Element, state: ElementState, tolerance: float) -> list[Subpath]:
     """Return the points of a circle or an ellipse; nothing if a radius is not positive."""
     if element.tag == "circle":
         rx = ry = state.parse_radius(element)
     else:
-        rx, ry = state.parse_lengths(element, "rx", "ry")
-        # A missing radius equals the other one.
-        if "rx" not in element.attributes:
-            rx = ry
-        elif "ry" not in element.attributes:
-            ry = rx
+        rx, ry = _parse_radii(element, state)
     if min(rx, ry) <= 0.0:
         return []
     center = np.array(state.parse_lengths(element, "cx", "cy"))
@@ -271,14 +276,9 @@ def _compute_ellipse(element: Element, state: ElementState, tolerance: float) ->
 def _compute_rectangle(element: Element, state: ElementState, tolerance: float) -> list[Subpath]:
     """Return the points of a rectangle, whose corners may be round; nothing if it has no area."""
     x, y, width, height = state.parse_lengths(element, "x", "y", "width", "height")
-    rx, ry = state.parse_lengths(element, "rx", "ry")
     if width <= 0.0 or height <= 0.0:
         return []
-    # A missing radius equals the other one.
-    if element.attributes.get("rx", "auto").strip() == "auto":
-        rx = ry
-    elif element.attributes.get("ry", "auto").strip() == "auto":
-        ry = rx
+    rx, ry = _parse_radii(element, state)
     rx = min(rx, width / 2)
     ry = min(ry, height / 2)
     corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
