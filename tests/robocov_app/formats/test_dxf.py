@@ -1,5 +1,6 @@
 """DXF drawings written by ezdxf: entities, blocks, layers, units, and rejected files."""
 
+import codecs
 import io
 import logging
 import math
@@ -349,6 +350,14 @@ def draw_nested_blocks(document: Any, space: Any) -> None:
     space.add_blockref("b40", (0, 0))
 
 
+def test_a_file_may_start_with_a_byte_order_mark(tmp_path: Path) -> None:
+    area = read_drawing(tmp_path, lambda d, m: m.add_circle((5, 5), 1)).free.area
+    path = tmp_path / "plan.dxf"
+    path.write_bytes(codecs.BOM_UTF8 + path.read_bytes())
+    assert detect_format(path).name == "dxf"
+    assert IMPORTERS["dxf"].read(path, ReadOptions()).free.area == pytest.approx(area)
+
+
 def draw_many_entities(document: Any, space: Any) -> None:
     add_chair(document)
     space.add_blockref("chair", (0, 0), dxfattribs={"row_count": 30000, "column_count": 30000})
@@ -360,6 +369,7 @@ def draw_many_entities(document: Any, space: Any) -> None:
         (b"", "expected a DXF with sections, got a file that begins with b''"),
         (b"hello", "expected a DXF with sections, got a file that begins with b'hello'"),
         (b"AutoCAD Binary DXF\r\n\x1a\0oops", "expected a readable DXF, got a damaged one"),
+        (b"\n0\nSECTION\n0\nEOF\n", "expected a readable DXF, got a damaged one"),
         (
             b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\nabc\n",
             "expected at least one closed outline or line, got none",

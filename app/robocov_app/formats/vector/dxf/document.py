@@ -7,7 +7,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from robocov.errors import MapError, RobocovError, to_one_line
+from robocov.errors import MapError, RobocovError, describe_error, to_one_line
 from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 
@@ -65,9 +65,10 @@ def load_document(path: Path, source_name: str) -> Any:
     for read in readers:
         try:
             return read(path)
-        except OSError as error:
-            raise MapError(f"{source_name}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # ezdxf raises exceptions of any type for a damaged file
+            if isinstance(error, OSError) and error.errno is not None:
+                raise MapError(f"{source_name}: cannot be read: {describe_error(error)}") from None
+            # Without a number, an OSError of ezdxf only means that the file does not begin as it expects.
             reason = to_one_line(error) or type(error).__name__
     reason = reason[:_MAX_REASON_CHARACTERS]
     raise MapError(f"{source_name}: expected a readable DXF, got a damaged one: {reason}")
