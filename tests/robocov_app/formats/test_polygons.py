@@ -110,6 +110,12 @@ def test_a_tangle_is_rejected_early(count: int) -> None:
     CrossingCounter("loose").add([shapely.LinearRing(ring[:200])])
 
 
+def test_the_message_about_crossings_states_their_number() -> None:
+    counter = CrossingCounter("knot", count=MAX_CROSSINGS)
+    with pytest.raises(MapError, match=f"got about {MAX_CROSSINGS + 1}$"):
+        counter.add([shapely.LineString([(0, 0), (2, 2)]), shapely.LineString([(0, 2), (2, 0)])])
+
+
 @pytest.mark.slow
 def test_crossings_of_all_shapes_are_counted_together() -> None:
     angle = np.arange(151) * 75 * math.tau / 151

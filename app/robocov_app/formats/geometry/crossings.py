@@ -1,5 +1,6 @@
 """Limit on the number of crossings of edges, because polygons with millions of crossings take hours."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -65,10 +66,8 @@ class CrossingCounter:
         else:
             self.count += self._estimate(edges)
         if self.count > MAX_CROSSINGS:
-            actual = f"about {self.count:.1g}"
-            raise MapError(
-                f"{self.source_name}: expected at most {MAX_CROSSINGS} crossings of lines, got {actual}"
-            )
+            expected = f"expected at most {MAX_CROSSINGS} crossings of lines"
+            raise MapError(f"{self.source_name}: {expected}, got about {math.ceil(self.count)}")
 
     def _estimate(self, edges: FloatArray) -> float:
         """Estimate the number of crossings from a random sample of edges."""
