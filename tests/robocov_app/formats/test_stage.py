@@ -185,6 +185,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
         ('\nmodel ( bitmap "no.png" )', r"no\.png: no such file"),
         ('include "hall.world"\nmodel ( )', "expected a file that does not include itself"),
         ("include model\nmodel ( )", "a file to include"),
+        ("model ( )\ninclude", ":2: expected a file to include, got the end of the file"),
         ("window ( )", "expected at least one closed outline or line, got none"),
         ("model ( " * 40, "nested deeper than 32"),
         ("define a model ( a ( ) )\na ( )", ":1: nested in more than 32 models"),
@@ -194,7 +195,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
             "expected at most 10000 models and blocks, got more",
         ),
     ],
-    ids=range(21),
+    ids=range(22),
 )
 def test_mistakes_are_reported_with_the_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "hall.world"

@@ -94,6 +94,8 @@ class _TokenReader:
             elif not is_include:
                 self._append(token)
             is_after_include = is_include and not is_after_include
+        if is_after_include:
+            raise MapError(f"{name}:{line}: expected a file to include, got the end of the file")
 
     def _append(self, token: Token) -> None:
         if len(self.tokens) >= MAX_TOKENS:
