@@ -90,6 +90,9 @@ def test_a_missing_boundary_becomes_a_rectangle_around_everything() -> None:
     assert foreign.free.area == pytest.approx(13 * 13 - 8)
     assert "--around" in foreign.boundary_source
     assert not foreign.has_named_boundary
+    with_pillar = build_map(collect_shapes(lines=[[[0, 0], [6, 0]]], points=[[9, 5]], pillar=0.5))
+    assert with_pillar.free.bounds == pytest.approx((-1, -1.05, 10.5, 6.5), abs=0.01)
+    assert with_pillar.dropped == ()
 
 
 def test_geometries_are_free_unless_one_contains_the_others() -> None:

@@ -30,7 +30,7 @@ _MAX_AREA_RATIO = 0.999
 
 
 def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary | None:
-    """Find the boundary of a drawing, which the format, its name or the shapes in it determine.
+    """Find the boundary that the format, a name or the shapes of a drawing determine.
 
     Parameters
     ----------
@@ -79,6 +79,7 @@ def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozen
         return Boundary(MultiPolygon([enclosed]), source)
     around = get_or_default(drawing.options.around, DEFAULT_AROUND_M)
     everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
+    everything += [pillar.polygon for pillar in drawing.pillars]
     x, y, right, top = shapely.total_bounds(everything)
     box = shapely.box(x - around, y - around, right + around, top + around)
     source = f"a rectangle {around:g} m around everything (--around): no shape contains the others"
