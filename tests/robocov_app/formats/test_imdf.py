@@ -150,6 +150,12 @@ def test_a_level_is_chosen_by_number_or_name(tmp_path: Path, asked: str) -> None
 def test_a_missing_level_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"level: expected 0, 1 or a name \(EG, OG\), got '7'"):
         read(write_folder(tmp_path / "mill", build_venue()), level="7")
+    # A level without units cannot be read, so its name is not offered.
+    venue = build_venue()
+    attic = build_feature("level", build_area(0, 0, 30, 20), ordinal=2, short_name={"de": "DG"})
+    venue["level"].append({**attic, "id": "attic"})
+    with pytest.raises(ParameterError, match=r"level: expected 0, 1 or a name \(EG, OG\), got 'DG'"):
+        read(write_folder(tmp_path / "house", venue), level="DG")
 
 
 def test_units_without_openings_are_open_to_each_other(tmp_path: Path) -> None:

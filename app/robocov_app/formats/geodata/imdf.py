@@ -266,11 +266,12 @@ def _choose_floor(
     try:
         floor = choose_floor(floors, number, archive.source_name)
     except ParameterError:
-        names = sorted({name for level in levels.values() for name in level.names[1:2]})
-        if not names:
-            raise
-        known = f"{list_floors(floors)} or a name ({', '.join(names[:10])})"
-        problem = f"expected {known}, got {quote(number)}"
+        used_levels = [level for level in levels.values() if level.ordinal in floors]
+        names = sorted({name for level in used_levels for name in level.names[1:2]})
+        known = f"one of {list_floors(floors)}"
+        if names:
+            known = f"{list_floors(floors)} or a name ({', '.join(names[:10])})"
+        problem = f"expected {known}, got {quote(requested)}"
         raise ParameterError(f"{archive.source_name}: level: {problem}") from None
     if len(floors) > 1:
         on_floor = [level for level in levels.values() if level.ordinal == floor]
