@@ -1,4 +1,4 @@
-"""Plots of degradations under disturbances."""
+"""Plots of degradations under disturbances, and of gaps."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -6,7 +6,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from robocov_app.figures.final_values import Sample
 from robocov_app.figures.statistics import Interval
+from robocov_app.look.curve_styles import choose_curve_styles
+from robocov_app.look.theme import LIGHT
+from robocov_app.replication.figures.comparison_plots import draw_gaps
 from robocov_app.replication.figures.degradation_plot import draw_degradations
 from robocov_app.replication.results.study_results import Degradation
 
@@ -55,3 +59,12 @@ def test_degradations_without_a_ratio_are_left_out() -> None:
     rows = [replace(row, ratio=unknown) if row.value == 0.1 else row for row in build_degradations()]
     figure = draw_degradations(rows)
     assert figure.axes[2].get_ylim() == figure.axes[0].get_ylim()
+
+
+def test_gaps_below_the_reference_are_shown_with_the_reference() -> None:
+    (style,) = choose_curve_styles(["rapf"])
+    (axes,) = draw_gaps([Sample("RAPF", style, np.array([-1.0, -0.5]))], LIGHT).axes
+    low, high = axes.get_xlim()
+    assert low < -1.0
+    assert high == 0.0
+    assert axes.get_xticks().tolist() == [0.0]

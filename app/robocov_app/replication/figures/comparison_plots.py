@@ -143,7 +143,8 @@ def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
     low = min(float(values.min()), 0.0)
-    high = float(values.max())
+    # The axis always includes the reference, even if all values are below it.
+    high = max(float(values.max()), 0.0)
     functions = (partial(_compute_signed_power, exponent=0.5), partial(_compute_signed_power, exponent=2.0))
     axes.set_xscale("function", functions=functions)
     # Leave some space to the left of values below the reference.
