@@ -32,6 +32,16 @@ def compute_solid_area(foreign: ForeignMap) -> shapely.Geometry:
     return SPACE - foreign.free
 
 
+def test_only_some_of_very_many_robots_become_starts(tmp_path: Path) -> None:
+    world = "world: {width: 100, height: 100}\n"
+    states = [[1 + 1.5 * (k % 60), 1 + 1.5 * (k // 60), 0] for k in range(1200)]
+    read(tmp_path, f"robot: {{number: 1200, state: {states}}}\nobstacle: []\n", world)
+    environment, report, _ = import_map(tmp_path / "world.yaml")
+    assert len(environment.starts["robots"].positions) == 1000  # type: ignore[union-attr]
+    note = 'start "robots": 1000 of 1200 positions of robots in the file; only the first 1000 are read'
+    assert note in report.notes
+
+
 def test_shapes_are_rotated_and_moved_to_their_states(tmp_path: Path) -> None:
     foreign = read(
         tmp_path,

@@ -141,7 +141,7 @@ def test_robots_are_starts_and_sensors_are_omitted(tmp_path: Path) -> None:
     (tmp_path / "hall.world").write_text(text.replace('pioneer ( name "r0" pose [2 -2 0 45] )', ""))
     environment, report, _ = import_map(tmp_path / "hall.world")
     assert "robots" not in environment.starts
-    assert 'no start "robots": no robot fits at the position of robots in the file' in report.notes
+    assert 'no start "robots": no robot fits at the position of the robot in the file' in report.notes
     # Names are those of models and of their macros.
     assert read(tmp_path, text, skip=("pioneer",)).robots == ()
     # Long names are shortened in the report.
