@@ -152,7 +152,7 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
     seconds_per_run = ", ".join(
         f"{name} {seconds:.2f} s" for name, seconds in expected.seconds_per_run.items()
     )
-    time = f"{format_duration(expected.seconds)} on {workers} processes"
+    time = f"{format_duration(expected.seconds)} on {format_count(workers, 'worker')}"
     if on_cluster:
         time = f"{format_duration(expected.seconds * workers)} of computing time on a Dask cluster"
     return f"{counts}, about {time} (measured: {seconds_per_run} per run); Ctrl+C keeps finished runs"
@@ -210,12 +210,8 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
 
 
 def _print_interruption(options: Arguments) -> int:
-    """Print the command that resumes an interrupted study, and return the exit status."""
-    arguments = ["robocov", "paper", "--out", str(options.out)]
-    if options.quick:
-        arguments.append("--quick")
-    arguments += options.selection
-    message = f"Interrupted. Partial results are in {options.out}/. To resume: {' '.join(arguments)}"
+    """Print where the results of an interrupted study are, and return the exit status."""
+    message = f"Interrupted. Partial results are in {options.out}/. Run the same command to resume."
     print_answer(options, {"out": str(options.out), "interrupted": True}, message)
     return INTERRUPTED
 

@@ -351,9 +351,9 @@ class TestStopping:
         assert process.returncode == 130
         forecast = next(line for line in messages.splitlines() if line.startswith("paper"))
         assert forecast.startswith(f"paper (quick): {RUN_COUNT} runs, about ")
-        assert re.search(r"on 2 processes \(measured: rapf \d", forecast)
+        assert re.search(r"on 2 workers \(measured: rapf \d", forecast)
         assert "Ctrl+C keeps finished runs" in forecast
-        assert f"To resume: robocov paper --out {out} --quick --without-beyond" in output
+        assert f"Partial results are in {out}/. Run the same command to resume." in output
         finished_count = count_finished_runs(out)
         assert 12 <= finished_count < RUN_COUNT
 
