@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import compress
+from numbers import Integral
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -9,7 +10,7 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.errors import ParameterError, quote, to_floats
+from robocov.errors import ParameterError, is_number, quote, to_floats
 from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
@@ -30,14 +31,14 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's `ObservationLayout`:
     float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for
     `CoverageTask.repeat` control periods. An episode is truncated after `CoverageTask.duration`, or after
-    `max_cycles` actions. The same seed and actions give the same episode, bit for bit.
+    `max_cycles` actions if that is earlier. The same seed and actions give the same episode, bit for bit.
 
     Parameters
     ----------
     task : CoverageTask, optional
         By default, a task with default values.
     max_cycles : int, optional
-        Maximum number of actions; by default, as many as fit into the duration.
+        Maximum number of actions; at most, and by default, as many as fit into the duration.
     **options
         Options of `robocov_app.learning.environment.EpisodeEnv`, and attributes of the task to change, as in
         ``CoverageParallelEnv(maps="museum", robots=4)``.
@@ -75,9 +76,12 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         self, task: CoverageTask | None = None, *, max_cycles: int | None = None, **options: Any
     ) -> None:
         super().__init__(task, **options)
-        self.max_cycles = self.task.cycles if max_cycles is None else max_cycles
-        if self.max_cycles < 1:
-            raise ParameterError(f"max_cycles: expected a whole number of at least 1, got {max_cycles}")
+        self.max_cycles = self.task.cycles
+        if max_cycles is not None:
+            if not is_number(max_cycles, Integral) or max_cycles < 1:
+                actual = quote(max_cycles)
+                raise ParameterError(f"max_cycles: expected a whole number of at least 1, got {actual}")
+            self.max_cycles = min(max_cycles, self.task.cycles)
         self.possible_agents = self.task.agents
         self.agents: list[str] = []
         self._rng = np.random.default_rng()

@@ -62,6 +62,16 @@ def test_the_check_of_pettingzoo_for_truncation_passes(
     max_cycles_test(Module)
 
 
+def test_an_episode_is_never_longer_than_the_duration(empty: Environment) -> None:
+    env = build_environment(empty, max_cycles=1000)
+    env.reset(seed=0)
+    cycles = 0
+    while env.agents:
+        env.step(dict.fromkeys(env.agents, (0.0, 0.0)))
+        cycles += 1
+    assert cycles == env.task.cycles == 20
+
+
 def run_random_episode(env: CoverageParallelEnv, seed: int, cycles: int = 6) -> list[bytes]:
     """Take random actions, and return all observations, rewards and infos."""
     observations, infos = env.reset(seed=seed)
@@ -185,7 +195,8 @@ def test_invalid_actions_and_options_are_rejected(empty: Environment) -> None:
     for invalid in ((0.0, np.inf), (1.0,), "go", None):
         with pytest.raises(ParameterError, match=r"action of robot_1: expected two finite numbers, got"):
             env.step({"robot_1": invalid})
-    with pytest.raises(ParameterError, match="max_cycles: expected a whole number of at least 1, got 0"):
-        build_environment(empty, max_cycles=0)
+    for invalid in (0, 2.5, "3"):
+        with pytest.raises(ParameterError, match="max_cycles: expected a whole number of at least 1, got"):
+            build_environment(empty, max_cycles=invalid)
     with pytest.raises(ParameterError, match="unknown attribute of a task 'map': did you mean 'maps'"):
         CoverageParallelEnv(map="rooms")
