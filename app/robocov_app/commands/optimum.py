@@ -149,7 +149,7 @@ def _build_problem(options: Arguments) -> _Problem:
 
 
 def _check_run(saved: SavedRun, first: SavedRun) -> None:
-    """Raise InputError if the team or map changes during a run, or the first run has another team size."""
+    """Raise InputError if a run has a changing team or map, or another team size than the first run."""
     record = saved.record
     if not has_constant_setting(record):
         raise InputError(

@@ -208,7 +208,7 @@ def _choose_grid(page: FigurePage, captions: _Captions, aspect: float) -> MapGri
     columns = _choose_columns(page, captions, aspect, top)
     caption_width = captions.max_width
     caption_height = _TWO_LINE_CAPTION_PX * page.scale
-    if captions.max_joined_width <= compute_column_width(page, columns):
+    if captions.fit_in_one_line(compute_column_width(page, columns)):
         caption_width = captions.max_joined_width
         caption_height = _ONE_LINE_CAPTION_PX * page.scale
     return MapGrid(

@@ -44,9 +44,9 @@ class FloorElement:
     Attributes
     ----------
     role : str
-        ``open`` and ``walled`` spaces are free, with walls along the outline of the latter; ``solid`` areas,
-        ``wall`` lines and ``post`` points are obstacles; an ``opening`` is a line of two points, as wide as
-        the door.
+        ``open`` spaces and ``room`` spaces are free, and rooms have walls along their outlines; ``solid``
+        areas, ``wall`` lines and ``post`` points are obstacles; an ``opening`` is a line of two points, as
+        wide as the door.
     geometry : SourceGeometry
         Its geometry, in meters.
     """
@@ -118,7 +118,7 @@ def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, des
     Parameters
     ----------
     shapes : Shapes
-        Holds the options, and collects the walls, obstacles and notes.
+        Contains the options, and collects the walls, obstacles and notes.
     elements : sequence of FloorElement
     name, description : str
         Name and description of the map.

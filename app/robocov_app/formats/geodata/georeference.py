@@ -50,7 +50,7 @@ def convert_to_meters(
     ----------
     geometries : list of SourceGeometry
     shapes : Shapes
-        Holds the options, and collects the notes.
+        Contains the options, and collects the notes.
     crs : str or None
         Reference system that the file names, such as ``EPSG:25832`` or an OGC URN.
     may_be_degrees : bool

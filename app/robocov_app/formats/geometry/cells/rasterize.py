@@ -276,7 +276,7 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
 def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: CellGrid) -> FloatArray:
     """Return the center of the first cell of each chosen island, (n, 2) m.
 
-    `islands` holds the number of the island of each cell, from 1 on; `chosen` holds indices from 0 on.
+    `islands` contains the number of the island of each cell, from 1; `chosen` contains indices from 0.
     """
     windows = ndimage.find_objects(islands)
     cells = []

@@ -44,7 +44,7 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
     path : Path
         File of the map.
     shapes : Shapes
-        Holds the options, and collects the notes.
+        Contains the options, and collects the notes.
 
     Raises
     ------

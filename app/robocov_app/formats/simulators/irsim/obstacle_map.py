@@ -24,7 +24,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     path : Path
         File of the world.
     shapes : Shapes
-        Holds the options, and collects the notes.
+        Contains the options, and collects the notes.
 
     Returns
     -------

@@ -79,7 +79,7 @@ class World(NamedTuple):
     Attributes
     ----------
     root : Entity
-        An entity that holds the children and properties at the top level of the file.
+        An entity that contains the children and properties at the top level of the file.
     macros : dict of str to Entity
         Entities on which others are based, keyed by name.
     """
