@@ -341,10 +341,12 @@ def _render(launcher: ViewerLauncher, options: Arguments) -> int:
             if result is not None:
                 folder = result.staging
             save_frames_and_video(frames, folder, options.video, HEADLESS_FPS)
-    for target in (options.out, options.video):
-        if target is not None:
-            echo(f"saved {target}")
-    return INTERRUPTED if interruption.requested else 0
+    targets = " and ".join(str(target) for target in (options.out, options.video) if target is not None)
+    if interruption.requested:
+        echo(f"Interrupted. Partial results are in {targets}.")
+        return INTERRUPTED
+    echo(f"saved {targets}")
+    return 0
 
 
 def _draw_frames(
@@ -365,9 +367,11 @@ def _draw_frames(
 
     for number in range(1, count + 1):
         # There is no player once the lesson has ended.
-        is_lesson_over = stops_at_lesson_end and window.lesson.player is None
-        if interruption.requested or is_lesson_over:
+        if stops_at_lesson_end and window.lesson.player is None:
             return
         window.run_frame(1.0 / HEADLESS_FPS)
         yield copy_pixels(window.screen)
         update(number)
+        # At least one frame is drawn, because a video needs one.
+        if interruption.requested:
+            return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from PIL import Image
 from sample_sessions import start_session
 
 from robocov_app.cli import main
+from robocov_app.commands import demo
 from robocov_app.commands.demo import Arguments, build_session
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.window.display import fit_to_screen, get_screen_scale, open_display
@@ -94,6 +96,16 @@ def test_a_video_has_all_frames_and_the_requested_size(tmp_path: Path) -> None:
     assert main([*command, "--robots", "1", "--speed", "4"]) == 0
     assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 8
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
+
+
+def test_an_early_ctrl_c_leaves_a_video_of_one_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(demo, "_start_lesson", lambda *_: signal.raise_signal(signal.SIGINT))
+    path = tmp_path / "window.mp4"
+    assert main(["demo", "square", *SHORT, "--frames", "8", "--video", str(path), "--robots", "1"]) == 130
+    assert capsys.readouterr().out == f"Interrupted. Partial results are in {path}.\n"
+    assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 1
 
 
 def test_frames_neither_read_nor_write_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
