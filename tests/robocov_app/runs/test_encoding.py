@@ -6,6 +6,8 @@ import itertools
 import os
 import re
 import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -246,6 +248,30 @@ class TestSaveVideo:
         with pytest.raises(OutputError, match=r"screen.mp4: cannot be written: Cannot allocate memory"):
             ScreenVideo(tmp_path / "screen.mp4", (64, 48))
         assert list_names(tmp_path) == []
+
+    @pytest.mark.parametrize("size", [(20, 20), (640, 480)])
+    def test_closing_a_screen_video_reports_an_encoder_that_has_ended(self, tmp_path, monkeypatch, size):
+        """Frames of 20 x 20 pixels fit into a buffer, which is written only when the input is closed."""
+        monkeypatch.setattr(
+            "robocov_app.viewer.window.screen_video.build_encoder_command",
+            lambda *arguments, **options: [sys.executable, "-c", "raise SystemExit(1)"],
+        )
+        video = ScreenVideo(tmp_path / "screen.mp4", size, waits=True)
+        video._process.wait()
+        video.add(pygame.Surface(size), 0.1)
+        errors = []
+
+        def close():
+            try:
+                video.close()
+            except OutputError as error:
+                errors.append(str(error))
+
+        thread = threading.Thread(target=close, daemon=True)
+        thread.start()
+        thread.join(20.0)
+        assert not thread.is_alive()
+        assert errors == [f"{tmp_path / 'screen.mp4'}: the video encoder failed"]
 
     def test_a_video_without_frames_is_rejected(self, tmp_path):
         with pytest.raises(ParameterError, match="frames"):

@@ -2,6 +2,7 @@
 
 import queue
 import threading
+from contextlib import suppress
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
 
@@ -119,11 +120,13 @@ class ScreenVideo:
         try:
             while (data := self._queue.get()) is not None:
                 self._process.stdin.write(data)
-            self._process.stdin.close()
         except OSError:
             # The encoder is gone. Empty the queue, so that `add` and `close` do not wait forever.
             while self._queue.get() is not None:
                 pass
+        # Closing may write buffered bytes, which fails as well if the encoder is gone; `close` reports that.
+        with suppress(OSError):
+            self._process.stdin.close()
 
 
 def _start_encoder(command: list[str], path: Path) -> Popen[bytes]:
