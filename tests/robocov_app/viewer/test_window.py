@@ -146,6 +146,18 @@ def test_a_video_lasts_as_long_as_the_recording(driver: Driver, tmp_path: Path) 
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
 
 
+@pytest.mark.parametrize(
+    ("count", "text"), [(0, "s)"), (1, "s, 1 frame skipped)"), (2, "s, 2 frames skipped)")]
+)
+def test_the_number_of_skipped_frames_of_a_video_is_reported(driver: Driver, count: int, text: str) -> None:
+    driver.press_key("f9")
+    driver.run_frames(3)
+    assert driver.window.video_recorder.video is not None
+    driver.window.video_recorder.video.skipped_count = count
+    driver.press_key("f9")
+    assert driver.viewer.message.endswith(text)
+
+
 def test_closing_the_window_completes_the_video(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.press_key("f9")

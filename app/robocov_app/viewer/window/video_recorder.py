@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pygame
 
+from robocov.errors import format_count
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.window.screen_video import ScreenVideo
@@ -66,7 +67,7 @@ class VideoRecorder:
         self.video = None
         self._viewer.view.is_recording = False
         video.close()
-        skipped = f", {video.skipped_count} frames left out" if video.skipped_count else ""
+        skipped = f", {format_count(video.skipped_count, 'frame')} skipped" if video.skipped_count else ""
         return f"video saved: {video.path} ({video.duration:.1f} s{skipped})"
 
     def pass_time(self, seconds: float) -> None:
