@@ -5,18 +5,24 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pygame
 import pytest
 from driven_editor import EditorDriver, build_sheet, open_editor
 
 from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import load_map
+from robocov_app.editor.canvas.overlay import draw_ghost
 from robocov_app.editor.edits import paths, properties, transform
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch, dump_sketch
 from robocov_app.editor.ui.typed_commands import run_typed_command
+from robocov_app.look.hues import choose_robot_hues
+from robocov_app.look.theme import LIGHT
+from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
 
 CART = CircleObstacle((2.0, 2.0), 0.5)
 ROUND = ObstaclePath(((2.0, 2.0), (8.0, 2.0), (8.0, 6.0)), 0.5)
@@ -247,6 +253,17 @@ def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: st
         assert (driver.copy_frame()[y, x] != with_path[y, x]).any()
         driver.press_key("l")
         assert driver.editor.motion_start_s is None
+
+
+def test_the_map_shows_through_the_holes_of_an_obstacle_in_motion() -> None:
+    hole = ((3.0, 3.0), (7.0, 3.0), (7.0, 7.0), (3.0, 7.0))
+    frame = PolygonObstacle(((1.0, 1.0), (9.0, 1.0), (9.0, 9.0), (1.0, 9.0)), (hole,))
+    surface = pygame.Surface((200, 200), 0, 32)
+    surface.fill(LIGHT.background)
+    camera = Camera.fit((0.0, 0.0, 10.0, 10.0), (0.0, 0.0, 200.0, 200.0), 0.0)
+    draw_ghost(Canvas(surface, camera, LIGHT, 1.0, choose_robot_hues(1), frozenset()), frame.polygon)
+    assert surface.get_at((100, 100))[:3] == LIGHT.background
+    assert surface.get_at((40, 100))[:3] != LIGHT.background
 
 
 def test_saved_obstacles_move_in_a_run(tmp_path: Path) -> None:

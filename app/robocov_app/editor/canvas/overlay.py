@@ -83,6 +83,7 @@ LENGTH_INK_SHARE = 0.85
 BADGE_EDGE_INK_SHARE = 0.3
 
 GHOST_OPACITY = 130  # of 255
+_CLEAR = (0, 0, 0, 0)
 SELECTION_BOX_OPACITY = 34  # of 255
 TYPED_TEXT_FACTOR = 1.1  # size of typed text, relative to other texts
 TEXT_CURSOR = "▏"
@@ -303,16 +304,27 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
     """Draw a translucent obstacle: one that is being drawn, or one that is shown in motion."""
     accent = canvas.theme.accent
     fill = (*mix(canvas.theme.obstacle, accent, GHOST_ACCENT_SHARE), GHOST_OPACITY)
+    for part in shapely.get_parts(geometry):
+        if isinstance(part, shapely.Polygon):
+            _fill_translucent_polygon(canvas, part, fill)
     for ring in build_outline(geometry).rings:
-        corners = canvas.camera.to_pixels(ring)
-        bounds = [*ring.min(axis=0), *ring.max(axis=0)]
-        box = compute_pixel_box(canvas.camera, bounds).clip(canvas.surface.get_clip())
-        if box:
-            image = Surface(box.size, pygame.SRCALPHA, 32)
-            shifted = np.clip(corners - np.array(box.topleft), -MAX_POLYGON_PX, MAX_POLYGON_PX)
-            pygame.draw.polygon(image, fill, np.rint(shifted).tolist())
-            canvas.surface.blit(image, box)
-        canvas.draw_outline(corners, accent, canvas.scale_width(EDGE_LINE_PX))
+        canvas.draw_outline(canvas.camera.to_pixels(ring), accent, canvas.scale_width(EDGE_LINE_PX))
+
+
+def _fill_translucent_polygon(
+    canvas: Canvas, polygon: shapely.Polygon, color: tuple[int, int, int, int]
+) -> None:
+    """Fill a polygon, m, without its holes, with an RGBA color."""
+    box = compute_pixel_box(canvas.camera, polygon.bounds).clip(canvas.surface.get_clip())
+    if not box:
+        return
+    image = Surface(box.size, pygame.SRCALPHA, 32)
+    # The polygon has an image of its own, so that the map shows through its holes.
+    for ring, ring_color in [(polygon.exterior, color), *((hole, _CLEAR) for hole in polygon.interiors)]:
+        corners = canvas.camera.to_pixels(np.asarray(ring.coords)[:-1])
+        shifted = np.clip(corners - np.array(box.topleft), -MAX_POLYGON_PX, MAX_POLYGON_PX)
+        pygame.draw.polygon(image, ring_color, np.rint(shifted).tolist())
+    canvas.surface.blit(image, box)
 
 
 def draw_preview(canvas: Canvas, tool_overlay: EditorToolOverlay, cursor: Point | None) -> None:
