@@ -468,6 +468,27 @@ def test_all_objects_are_listed_including_hidden_ones(driver: EditorDriver) -> N
     assert driver.editor.selection.items == {0}
 
 
+def test_a_start_that_is_named_like_a_number_is_selected_in_the_list(tmp_path: Path) -> None:
+    """Obstacles have numbers as keys, and so has the boundary."""
+    starts = (("0", DiscStart((8, 2), 0.8)), ("-1", DiscStart((2, 8), 0.8)))
+    with open_editor(tmp_path, build_sheet(BOX, starts=starts)) as driver:
+        driver.open_tab("object")
+        driver.editor.select(Selection())
+        driver.run_frames(2)
+        widgets = driver.window.panel.ui.widgets.values()
+        boxes = {each.text: each.rect for each in widgets if each.key.startswith("object:")}
+        for text, selection in (
+            ("polygon “box”", Selection.of(0)),
+            ("start “0”", Selection.of("0")),
+            ("start “-1”", Selection.of("-1")),
+            ("boundary", Selection(boundary=True)),
+        ):
+            driver.editor.select(Selection())
+            driver.run_frames(2)
+            driver.click(*boxes[text].center)
+            assert driver.editor.selection == selection
+
+
 @pytest.mark.slow
 def test_many_selected_objects_are_outlined_once_with_the_same_pixels(tmp_path: Path, monkeypatch) -> None:
     shapes = [CircleObstacle((k % 20 * 0.45 + 0.5, k // 20 * 0.8 + 0.5), 0.2) for k in range(210)]

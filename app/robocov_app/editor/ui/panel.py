@@ -444,7 +444,9 @@ class EditorPanel(CommandPanel):
                 owner, marks_text = rows[number]
                 is_selected = owner in editor.selection.owners
                 name = format_numbered_name(sketch, owner)
-                if ui.option(name, marks_text, key=f"object:{owner}", highlighted=is_selected):
+                # The quotes around the name of a start distinguish it from the key of an obstacle.
+                key = f"object:{owner!r}"
+                if ui.option(name, marks_text, key=key, highlighted=is_selected):
                     self._select(Selection.of(owner), editor.selection.without_vertices())
 
     def _draw_vertex_list(self, ui: Ui) -> None:
