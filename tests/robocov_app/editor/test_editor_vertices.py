@@ -10,7 +10,14 @@ from drawn_sketches import HALL, valid_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    ObstaclePath,
+    PointsStart,
+    PolygonObstacle,
+    WallObstacle,
+)
 from robocov.errors import MapError
 from robocov_app.editor.edits import vertices
 from robocov_app.editor.model.selection import (
@@ -283,6 +290,21 @@ def test_walls_join_in_any_order_either_way_round(order, turned):
     sketch, keys = Sketch().with_obstacles([WallObstacle(tuple(piece), 0.1) for piece in pieces])
     (item,) = vertices.join_walls(sketch, Selection.of(*keys)).sketch.obstacles
     assert list(item.shape.points) in (whole, whole[::-1])
+
+
+def test_joined_walls_move_along_the_path_of_the_lowest():
+    there = ObstaclePath(((0.5, 0.0), (0.5, 3.0)), 0.5, "back-and-forth")
+    back = ObstaclePath(((0.5, 0.0), (3.0, 0.0)), 0.5, "back-and-forth")
+    walls = [
+        WallObstacle(((0.0, 0.0), (1.0, 0.0)), 0.1, path=there),
+        WallObstacle(((1.0, 0.0), (2.0, 0.0)), 0.1, path=back),
+        WallObstacle(((2.0, 0.0), (3.0, 0.0)), 0.1),
+    ]
+    sketch, keys = Sketch().with_obstacles(walls)
+    change = vertices.join_walls(sketch, Selection.of(*keys))
+    (item,) = change.sketch.obstacles
+    assert item.shape.path == there
+    assert change.description == "3 walls joined, 1 path removed"
 
 
 def test_separate_walls_are_joined_at_their_nearest_ends():

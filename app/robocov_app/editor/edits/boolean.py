@@ -12,6 +12,7 @@ import shapely
 from robocov.environment import GRID_M, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MIN_SIZE_M
+from robocov_app.editor.edits.paths import describe_lost_paths
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import extract_polygons, require_size, round_length
 from robocov_app.editor.model.selection import Change, Selection, format_numbered_name, replace_obstacles
@@ -25,7 +26,7 @@ _intersection = partial(shapely.intersection, grid_size=GRID_M)
 def unite(sketch: Sketch, selection: Selection) -> Change:
     """Unite the selected obstacles."""
     items = _require_solid_items(sketch, selection, "unite")
-    description = f"{format_count(len(items), 'obstacle')} united{_describe_lost_paths(items)}"
+    description = f"{format_count(len(items), 'obstacle')} united{describe_lost_paths(items)}"
     return _replace_items(sketch, items, [_unite_geometries(items)], description)
 
 
@@ -44,7 +45,7 @@ def intersect(sketch: Sketch, selection: Selection) -> Change:
     """Replace the selected obstacles by their common area."""
     items = _require_solid_items(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
-    description = f"{format_count(len(items), 'obstacle')} intersected{_describe_lost_paths(items)}"
+    description = f"{format_count(len(items), 'obstacle')} intersected{describe_lost_paths(items)}"
     return _replace_items(sketch, items, [common], description, "they have nothing in common")
 
 
@@ -172,15 +173,6 @@ def _build_boundary_polygon(sketch: Sketch) -> shapely.Polygon | None:
 
 def _unite_geometries(items: Sequence[Item]) -> shapely.Geometry:
     return shapely.union_all([item.geometry for item in items], grid_size=GRID_M)
-
-
-def _describe_lost_paths(items: Sequence[Item]) -> str:
-    """Return the end of a status message about the paths of obstacles that differ from that of the lowest."""
-    kept_path = items[0].shape.path
-    lost_count = sum(item.shape.path not in (None, kept_path) for item in items)
-    if lost_count == 0:
-        return ""
-    return f", {format_count(lost_count, 'path')} removed"
 
 
 def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:

@@ -1,19 +1,19 @@
 """Edits of the paths of moving obstacles: waypoints, speed, and whether they go back or in a loop."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
 from robocov.environment import ObstaclePath, Point, Repeat
-from robocov.errors import MapError
+from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SPEED_M_S, MIN_SIZE_M, MIN_SPEED_M_S
 from robocov.typing import FloatArray
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import compute_center, round_map_point, to_array
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.toolkit.tools.geometry import find_nearest_on_edges
 
 PathEdit: TypeAlias = Callable[[ObstaclePath], ObstaclePath | None]
@@ -147,6 +147,26 @@ def describe_path(path: ObstaclePath | None) -> str:
         kind = "loop"
     length = path.speed * path.period
     return f"{path.speed:g} m/s, {kind} of {length:.4g} m in {path.period:.4g} s"
+
+
+def describe_lost_paths(items: Sequence[Item]) -> str:
+    """Return the end of a status message on obstacles that become one, with the path of the lowest.
+
+    Parameters
+    ----------
+    items : sequence of Item
+        The obstacles, the lowest first.
+
+    Returns
+    -------
+    str
+        For example ", 2 paths removed"; empty if no path differs from that of the lowest.
+    """
+    kept_path = items[0].shape.path
+    lost_count = sum(item.shape.path not in (None, kept_path) for item in items)
+    if lost_count == 0:
+        return ""
+    return f", {format_count(lost_count, 'path')} removed"
 
 
 def _require_path(sketch: Sketch, key: int, number: int) -> ObstaclePath:

@@ -20,6 +20,7 @@ from robocov.environment import Point, Ring
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.typing import BoolArray, FloatArray
+from robocov_app.editor.edits.paths import describe_lost_paths
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
     drop_repeated_points,
@@ -212,7 +213,7 @@ def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, 
                 count += len(cuts)
         if rings != list(sketch.list_vertex_rings(owner)):
             changed = changed.with_rings(owner, rings)
-    require(count, "select corners first, of polygons, walls or the boundary")
+    require(count, "select corners of polygons, walls or the boundary first")
     description = f"corner {action}"
     if count > 1:
         description = f"{count} corners {action}"
@@ -327,17 +328,18 @@ def _require_wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
 
 
 def join_walls(sketch: Sketch, selection: Selection) -> Change:
-    """Join the selected walls at their nearest ends into one, with the width of the lowest wall."""
+    """Join the selected walls at their nearest ends into one, with the width and path of the lowest wall."""
     items = selection.list_items(sketch)
     walls = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
     require(len(walls) == len(items) >= 2, "select two or more walls to join, and nothing else")
     points = _join_lines([wall.points for wall in walls])
     name = next((wall.name for wall in walls if wall.name is not None), None)
     note = next((item.note for item in items if item.note), "")
-    joined = replace(items[0], shape=env.WallObstacle(points, walls[0].width, name), note=note)
+    joined = replace(items[0], shape=replace(walls[0], points=points, name=name), note=note)
     remaining = sketch.without(item.key for item in items[1:])
     changed = remaining.with_items([joined])
-    return Change(changed, Selection.of(joined.key), f"{len(items)} walls joined")
+    description = f"{len(items)} walls joined{describe_lost_paths(items)}"
+    return Change(changed, Selection.of(joined.key), description)
 
 
 def _join_lines(lines: list[Ring]) -> Ring:
