@@ -139,7 +139,7 @@ class TestEdits:
             (lambda: density_edits.set_floor(build_sheet(), 0.0), "floor: expected .*, got 0"),
             (
                 lambda: density_edits.add_peak(build_dense_map(KINDS["rooms"]), (1.0, 1.0), 1.0, 1.0),
-                "is a polygons",
+                "hot spots cannot be added to a density of the kind “polygons”",
             ),
         ],
     )
@@ -238,6 +238,13 @@ class TestAreas:
         assert density_edits.remove_feature(sketch, 0).sketch.density is None
         assert parse_sketch(dump_sketch(bent), "again").density == bent.density
 
+    def test_the_weight_outside_areas_is_not_called_a_minimum(self):
+        """The weights of areas may be lower."""
+        sketch = density_edits.add_area(build_sheet(), WeightedArea(AREA, 0.5)).sketch
+        assert density_edits.set_floor(sketch, 2.0).description == "the weight is 2 outside all areas"
+        peak = density_edits.add_peak(build_sheet(), (3.0, 4.0), 1.5, 4.0).sketch
+        assert density_edits.set_floor(peak, 2.0).description == "the weight is at least 2 everywhere"
+
     def test_polygons_become_areas_with_their_holes_and_names(self):
         hole = ((3.0, 3.0), (4.0, 3.0), (4.0, 4.0))
         sketch, keys = build_sheet().with_obstacles(
@@ -257,7 +264,16 @@ class TestAreas:
                 lambda s: density_edits.add_area(s, WeightedArea((*AREA[:2], AREA[3], AREA[2]), 1.0)),
                 "crossings",
             ),
-            (lambda s: density_edits.add_area(build_dense_map(), WeightedArea(AREA, 1.0)), "is a gaussians"),
+            (
+                lambda s: density_edits.add_area(build_dense_map(), WeightedArea(AREA, 1.0)),
+                "areas cannot be added to a density of the kind “gaussians”",
+            ),
+            (
+                lambda s: density_edits.add_peak(
+                    density_edits.set_weight(s, 0, 1.0).sketch, (8.0, 8.0), 1.0, 4.0
+                ),
+                "hot spots cannot be added",
+            ),
             (lambda s: density_edits.move_corner(s, 0, 9, (0.0, 0.0)), "corner no longer exists"),
             (lambda s: density_edits.resize_peak(s, 0, 1.0), "hot spot no longer exists"),
             (lambda s: density_edits.set_weight(density_edits.set_floor(s, 0.0).sketch, 0, 0.0), "above 0"),
@@ -277,6 +293,11 @@ class TestAreas:
             driver.type("6")
             driver.press_key("return")
             assert driver.sketch.density.areas[0].weight == 6.0
+            driver.type("0")
+            driver.press_key("return")
+            assert driver.sketch.density.areas[0].weight == 0.0
+            driver.type("6")
+            driver.press_key("return")
             driver.wait()
             driver.drag(
                 *(driver.find_pixel(point) for point in (first.vertices[2], (11.5, 6.0), (12.0, 6.0)))

@@ -46,8 +46,10 @@ def compute_spread(peak: Gaussian) -> float:
 
 def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
     """Add a hot spot with a center and standard deviation, m; a map without density gets a floor of 1."""
-    if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.is_uniform:
-        raise _build_kind_error(sketch.density, ", hot spots are not")
+    # A uniform image is replaced by a floor of the same weight, but areas would be lost.
+    has_areas = isinstance(sketch.density, WeightedPolygons)
+    if isinstance(sketch.density, WeightedPolygons | Raster) and (has_areas or not sketch.density.is_uniform):
+        raise _build_kind_error(sketch.density, "hot spots cannot be added to")
     peak = Gaussian(round_map_point(center), _round_weight(weight, MIN_PEAK_WEIGHT), _round_sigma(sigma))
     return _set_features(sketch, (*list_features(sketch), peak), "hot spot added")
 
@@ -55,7 +57,7 @@ def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Chan
 def add_area(sketch: Sketch, area: WeightedArea) -> Change:
     """Add an area of constant weight on top of others; a map without density gets a background of 1."""
     if isinstance(sketch.density, Gaussians | Raster):
-        raise _build_kind_error(sketch.density, ", areas are not")
+        raise _build_kind_error(sketch.density, "areas cannot be added to")
     area = _check_area(replace(area, vertices=drop_repeated_points(round_ring(area.vertices))))
     return _set_features(sketch, (*list_features(sketch), area), "area added")
 
@@ -129,7 +131,11 @@ def set_floor(sketch: Sketch, floor: float) -> Change:
     if features:
         minimum = 0.0
     floor = _round_weight(floor, minimum, name="floor")
-    return _set_features(sketch, features, f"the weight is at least {floor:g} everywhere", floor)
+    description = f"the weight is at least {floor:g} everywhere"
+    if isinstance(sketch.density, WeightedPolygons):
+        # The weights of areas may be lower than the background.
+        description = f"the weight is {floor:g} outside all areas"
+    return _set_features(sketch, features, description, floor)
 
 
 def remove_density(sketch: Sketch) -> Change:
@@ -138,13 +144,19 @@ def remove_density(sketch: Sketch) -> Change:
     return Change(replace(sketch, density=None), Selection(), "density removed")
 
 
-def parse_weight(text: str) -> float:
-    """Parse a weight that the user typed; raise MapError if it is invalid."""
+def parse_weight(sketch: Sketch, text: str) -> float:
+    """Parse a weight that the user typed for a hot spot or, if the density consists of areas, for an area.
+
+    Raise MapError if it is invalid.
+    """
     try:
         weight = float(text)
     except ValueError:
         raise MapError(f"weight: expected a number, got “{text}”") from None
-    return _round_weight(weight, MIN_PEAK_WEIGHT)
+    minimum = MIN_PEAK_WEIGHT
+    if isinstance(sketch.density, WeightedPolygons):
+        minimum = 0.0
+    return _round_weight(weight, minimum)
 
 
 def describe_density(density: Density | None) -> str:
@@ -162,8 +174,8 @@ def describe_density(density: Density | None) -> str:
     return f"{kind}, {density.lower_bound:g} to {density.upper_bound:g}"
 
 
-def _build_kind_error(density: Density, reason: str = "") -> MapError:
-    return MapError(f"this map's density is a {density.kind}{reason}: remove it first by “density none”")
+def _build_kind_error(density: Density, problem: str) -> MapError:
+    return MapError(f"{problem} a density of the kind “{density.kind}”: remove it first with “density none”")
 
 
 def _set_features(
@@ -199,7 +211,7 @@ def _get_base(density: Density | None) -> float:
         return density.background
     if density.is_uniform:
         return density.upper_bound
-    raise _build_kind_error(density)
+    raise _build_kind_error(density, "the editor cannot change")
 
 
 def _replace_feature(sketch: Sketch, number: int, feature: Feature, action: str) -> Change:

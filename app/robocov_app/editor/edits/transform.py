@@ -383,7 +383,9 @@ def _rotate_density(density: Density | None, affine: Affine) -> Density | None:
         return rotated
     if density is not None and not density.is_uniform:
         kind = density.kind
-        raise MapError(f"a density that is a {kind} cannot be rotated: remove it first by “density none”")
+        raise MapError(
+            f"a density of the kind “{kind}” cannot be rotated: remove it first with “density none”"
+        )
     return density
 
 

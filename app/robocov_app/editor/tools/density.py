@@ -120,7 +120,7 @@ class DensityTool(EditorTool):
 
     def enter_text(self, context: EditorContext, text: str) -> None:
         """Set the weight of the chosen feature and of new ones."""
-        weight = density.parse_weight(text)
+        weight = density.parse_weight(context.sketch, text)
         if self.chosen is not None:
             context.apply(density.set_weight(context.sketch, self.chosen, weight))
         self.weight = weight
