@@ -102,6 +102,10 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         driver.click(*at)
         assert driver.editor.problem is problems[0]
         assert driver.message == to_sentence_case(problems[0].message)
+        driver.wait()
+        driver.click(*at)
+        assert driver.editor.problem is None
+        assert driver.message == ""
         driver.open_tab("problems")
         driver.window.canvas.zoom(8.0, (100.0, 100.0))
         driver.click(*driver.get_widget("option", f"problem:{len(problems) - 1}").rect.center)

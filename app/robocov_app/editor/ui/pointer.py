@@ -78,7 +78,7 @@ class EditorPointer(Pointer):
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
         """Handle a press: start to pan, show or hide the message of a problem, or start to use the tool.
 
-        None outside the sheet and on problems, where the press does not start a gesture.
+        Return None if the press is outside the sheet or on a problem, because it starts no gesture there.
         """
         if not self.canvas.contains(event.pos):
             return None
@@ -93,12 +93,14 @@ class EditorPointer(Pointer):
         return EditorToolGesture(self)
 
     def _toggle_problem(self, problem: Problem) -> None:
+        """Show the message of a problem, or hide it if it is shown."""
         editor = self.editor
         if editor.problem is problem:
             editor.problem = None
+            editor.clear_message()
         else:
             editor.problem = problem
-        editor.show_message(problem.message, is_error=problem.is_error)
+            editor.show_message(problem.message, is_error=problem.is_error)
         editor.revision += 1
 
     def _press_tool(self, event: pygame.event.Event, now: float) -> None:
