@@ -116,6 +116,22 @@ def test_all_maps_are_reached_by_the_arrows_next_to_the_thumbnails() -> None:
         assert {f"map:{name}" for name in list_bundled_maps()} <= seen
 
 
+def test_the_wheel_scrolls_the_maps_unless_it_turns_sideways() -> None:
+    with open_page() as page:
+
+        def list_maps_after_wheel(x: int, y: int) -> list[str]:
+            pygame.event.post(pygame.event.Event(pygame.MOUSEWHEEL, x=x, y=y, precise_x=x, precise_y=y))
+            page.run_frame(0.02)
+            return [item.name for item in page.focus.items if item.name.startswith("map:")]
+
+        first = list_maps_after_wheel(0, 1)
+        assert list_maps_after_wheel(1, 0) == first
+        second = list_maps_after_wheel(0, -1)
+        assert second != first
+        assert list_maps_after_wheel(-1, 0) == second
+        assert list_maps_after_wheel(0, 1) == first
+
+
 def test_a_recent_session_is_opened_and_a_missing_one_reported(tmp_path: Path) -> None:
     session = tmp_path / "class.robocov"
     session.write_text("{}")

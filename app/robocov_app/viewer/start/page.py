@@ -221,7 +221,7 @@ class StartPage(BaseWindow):
         elif event.type == pygame.MOUSEMOTION:
             self.focus.point_at(event.pos)
         elif event.type == pygame.MOUSEWHEEL:
-            self._scroll_maps(-1 if get_wheel_notches(event) > 0 else 1)
+            self._scroll_by_wheel(get_wheel_notches(event))
         elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             self._click(event.pos)
 
@@ -241,6 +241,12 @@ class StartPage(BaseWindow):
         item = self.focus.find_at(pixel)
         if item is not None:
             item.action()
+
+    def _scroll_by_wheel(self, notches: float) -> None:
+        """Show earlier thumbnails if the wheel turns up, later ones if it turns down."""
+        # A touchpad that scrolls sideways reports 0 notches.
+        if notches != 0.0:
+            self._scroll_maps(-1 if notches > 0.0 else 1)
 
     def _scroll_maps(self, steps: int) -> None:
         """Show later or earlier thumbnails."""
