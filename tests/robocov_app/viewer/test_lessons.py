@@ -74,6 +74,18 @@ def test_chapters_are_short_and_their_layers_exist(chapter) -> None:
     assert len(chapter.text.split()) / seconds < 5.0
 
 
+@pytest.mark.parametrize(("distance", "ends"), [(100.0, True), (0.001, False)])
+def test_a_chapter_that_ends_at_a_mean_distance_is_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, distance: float, ends: bool
+) -> None:
+    monkeypatch.setattr(player, "MAX_TASK_S", 1.0)
+    path = write_short_lesson(tmp_path, until={"mean_distance_below": distance})
+    first, second = check_lesson(path, load_lesson(path))
+    assert first.ends
+    assert second.ends is ends
+    assert second.duration == pytest.approx(0.0 if ends else 1.0, abs=0.02)
+
+
 @pytest.mark.slow
 def test_every_chapter_of_the_lesson_ends() -> None:
     assert all(chapter.ends for chapter in check_lesson(FIRST_LESSON, load_lesson()))

@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
+from robocov.environment import Environment
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.key_hints import explain_kept_edits, explain_lesson_repetition
 from robocov_app.viewer.lessons.suspended_session import SuspendedSession
 from robocov_app.viewer.presenter import Presenter
@@ -29,6 +31,7 @@ READING_S_PER_WORD = 0.25
 """Real time added for each word of what there is to read."""
 _CHAPTER_CHANGE_S = 0.5  # real time between two chapters, as a margin of the duration
 MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up on a chapter
+_DISTANCE_INTERVAL_S = 0.5  # simulated time between the mean distances that `check_lesson` computes
 STEPS_PER_SECOND = 60
 _DEFAULT_NEXT_STEPS = (
     "End the lesson, then draw a wall (W) and see how the robots react.",
@@ -524,6 +527,43 @@ def _open_at_start(saved: SavedSession) -> Session:
     return Session.open(replace(saved, head=saved.document.nodes[0], step=0))
 
 
+class _DistanceSampler:
+    """Adds mean distances to the curve of the first pane, as the window does, but at regular intervals.
+
+    Parameters
+    ----------
+    session : Session
+        The session that plays without a window.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._costs = Costs(direct=True)
+        self._environment: Environment | None = None
+        self._radius = 0.0
+
+    def update(self) -> None:
+        """Add the mean distance at the present step if one is due."""
+        timeline = self._session.timeline
+        pane = timeline.panes[0]
+        curve = pane.distance_curve
+        if len(curve) and timeline.end_time < curve.last_time + _DISTANCE_INTERVAL_S:
+            return
+        environment = self._session.displayed.environment
+        radius = pane.setup.team.min_radius
+        if environment is not self._environment or radius != self._radius:
+            self._environment = environment
+            self._radius = radius
+            self._costs.set_environment(environment, radius)
+        self._costs.request(pane.number, timeline.end_time, pane.positions)
+        for _, known_cost in self._costs.poll():
+            curve.add(known_cost.time, known_cost.result.mean_distance)
+
+    def close(self) -> None:
+        """End the computation of costs."""
+        self._costs.close()
+
+
 @dataclass(frozen=True)
 class ChapterResult:
     """Outcome of playing a chapter without a user.
@@ -567,14 +607,31 @@ def check_lesson(path: Path, saved: SavedSession) -> list[ChapterResult]:
     results: list[ChapterResult] = []
     for index, chapter in enumerate(saved.lesson.chapters):
         _go_to_start(session, chapter)
-        ends = is_fulfilled(chapter.until, session)
-        while not ends and session.timeline.end_time < MAX_TASK_S:
-            session.playback.step()
-            ends = is_fulfilled(chapter.until, session)
+        ends = _play_chapter(session, chapter)
         if ends:
             _check_edit_was_made(chapter, session, str(path), ("lesson", "chapters", index, "until"))
         results.append(ChapterResult(chapter.title, session.timeline.end_time, ends))
     return results
+
+
+def _play_chapter(session: Session, chapter: ChapterModel) -> bool:
+    """Play a chapter from its start, and return whether it ends within `MAX_TASK_S`."""
+    sampler: _DistanceSampler | None = None
+    # No other condition needs the mean distance, which takes long to compute.
+    if chapter.until.mean_distance_below is not None:
+        sampler = _DistanceSampler(session)
+    try:
+        while True:
+            if sampler is not None:
+                sampler.update()
+            if is_fulfilled(chapter.until, session):
+                return True
+            if session.timeline.end_time >= MAX_TASK_S:
+                return False
+            session.playback.step()
+    finally:
+        if sampler is not None:
+            sampler.close()
 
 
 def _check_edit_was_made(
