@@ -184,6 +184,7 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "a star of 241 points, WKT": ("star.wkt", lambda: build_wkt(build_star(241))),
     "a comb of 40,000 teeth": ("comb.wkt", lambda: build_wkt(build_comb(40_000))),
     "a comb of 12,000 teeth": ("short.wkt", lambda: build_wkt(build_comb(12_000))),
+    "a comb of 4,000 teeth": ("shorter.wkt", lambda: build_wkt(build_comb(4_000))),
     "111,000 pillars": ("pillars.pgm", lambda: build_pgm(build_pillars(1000))),
     "7,900 pillars": ("some.pgm", lambda: build_pgm(build_pillars(267))),
     "140 x 140 squares that touch at corners": ("squares.geojson", lambda: build_geojson(build_squares(140))),

@@ -132,6 +132,8 @@ class Tally:
         Distinct outcomes: descriptions, and error messages without names and numbers.
     findings : dict
         Case, job and outcome by signature.
+    unread_seeds : list of Outcome
+        Outcomes of the seeds that were not read.
     slowest : float, s
         Maximum time of a case.
     """
@@ -140,6 +142,7 @@ class Tally:
     counts: Counter[str] = field(default_factory=Counter)
     kinds: set[str] = field(default_factory=set)
     findings: dict[str, tuple[Case, Job, Outcome]] = field(default_factory=dict)
+    unread_seeds: list[Outcome] = field(default_factory=list)
     slowest: float = 0.0
 
     def note(self, case: Case, job: Job, outcome: Outcome) -> bool:
@@ -192,7 +195,13 @@ class Corpus:
         return random.choice(self.read if is_read else self.rejected)
 
 
-def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]) -> Tally:
+def fuzz(
+    target: str,
+    reader: Reader,
+    seed: int,
+    enough: Callable[[Tally], bool],
+    batch_cases: int = _BATCH_CASES,
+) -> Tally:
     """Read mutated and generated cases of a target until it is enough, and return their outcomes.
 
     Batches of mutated and of generated cases alternate. Cases with new outcomes are mutated in turn.
@@ -201,14 +210,18 @@ def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]
     random = Random(f"{target} {seed}")
     corpus = Corpus([*SEEDS[target]])
     for case in SEEDS[target]:
-        tally.note(case, build_usual_job(target), reader.read(case, build_usual_job(target)))
+        job = build_usual_job(target)
+        outcome = reader.read(case, job)
+        tally.note(case, job, outcome)
+        if outcome.outcome != "read":
+            tally.unread_seeds.append(outcome)
     number = 0
     while not enough(tally):
         cases: Iterable[Case]
         if number % 2:
-            cases = _generate_structured(target, seed + number)
+            cases = _generate_structured(target, seed + number, batch_cases)
         else:
-            cases = _generate_mutated(target, corpus, random)
+            cases = _generate_mutated(target, corpus, random, batch_cases)
         for case in cases:
             job = draw_job(target, random)
             outcome = reader.read(case, job)
@@ -220,12 +233,12 @@ def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]
     return tally
 
 
-def _generate_mutated(target: str, corpus: Corpus, random: Random) -> Iterator[Case]:
-    for _ in range(_BATCH_CASES):
+def _generate_mutated(target: str, corpus: Corpus, random: Random, count: int) -> Iterator[Case]:
+    for _ in range(count):
         yield mutate(corpus.draw(random), target, corpus.read, random)
 
 
-def _generate_structured(target: str, seed: int) -> list[Case]:
+def _generate_structured(target: str, seed: int, count: int) -> list[Case]:
     """Generate cases by a hypothesis strategy, or none if the target has no strategy."""
     import hypothesis
     from fuzz_structures import STRUCTURES
@@ -233,7 +246,7 @@ def _generate_structured(target: str, seed: int) -> list[Case]:
     cases: list[Case] = []
     if target in STRUCTURES:
         settings = hypothesis.settings(
-            max_examples=_BATCH_CASES,
+            max_examples=count,
             database=None,
             deadline=None,
             derandomize=False,

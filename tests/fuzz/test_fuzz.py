@@ -1,5 +1,6 @@
 """A short run of `importers.py`, and tests of the fuzzer itself."""
 
+import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,9 +18,12 @@ pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="select() works with pipes on POSIX only"),
 ]
 
-CASE_COUNT = 80
-CASE_COUNTS = {"dxf": 30}
-"""Fewer cases for formats with slow libraries."""
+CASE_COUNT = 30
+"""Number of cases of a format, in addition to its seeds."""
+CASE_COUNTS = {"dxf": 10, "coverage-control": 10}
+"""Fewer cases for formats that take long to read."""
+BATCHES_PER_FORMAT = 2
+"""One of mutated seeds, and one of generated documents."""
 
 
 @pytest.fixture(scope="module")
@@ -33,21 +37,24 @@ def test_every_target_has_seeds() -> None:
 
 
 @pytest.mark.parametrize("target", SEEDS)
-def test_every_seed_is_read(target: str, reader: Reader) -> None:
-    for case in SEEDS[target]:
-        outcome = reader.read(case, importers.build_usual_job(target))
-        assert outcome.outcome == "read", f"{outcome.text}\n{outcome.traceback}"
-
-
-@pytest.mark.parametrize("target", SEEDS)
-def test_fuzzed_files_are_read_or_rejected(target: str, reader: Reader, tmp_path: Path) -> None:
+def test_seeds_are_read_and_fuzzed_files_are_read_or_rejected(
+    target: str, reader: Reader, tmp_path: Path
+) -> None:
     case_count = CASE_COUNTS.get(target, CASE_COUNT)
-    tally = importers.fuzz(target, reader, 0, lambda tally: sum(tally.counts.values()) >= case_count)
+    total_count = len(SEEDS[target]) + case_count
+    tally = importers.fuzz(
+        target,
+        reader,
+        seed=0,
+        enough=lambda tally: sum(tally.counts.values()) >= total_count,
+        batch_cases=case_count // BATCHES_PER_FORMAT,
+    )
     for case, job, outcome in tally.findings.values():
         folder = importers.save(tmp_path, target, case, job, outcome)
         print(f"{folder}\n{outcome.signature}\n{outcome.text}\n{outcome.traceback}")
+    assert not tally.unread_seeds
     assert not tally.findings
-    assert sum(tally.counts.values()) == case_count
+    assert sum(tally.counts.values()) == total_count
     assert len(tally.kinds) > 1
 
 
@@ -81,12 +88,13 @@ def test_unexpected_effects_are_findings(word: str, kind: str, text: str, reader
     assert read_misbehaving_file("fine", reader).outcome == "read"
 
 
-def test_a_hanging_process_is_restarted() -> None:
-    with Reader(seconds=0.3) as reader:
-        assert read_misbehaving_file("fine", reader).outcome == "read"
-        assert read_misbehaving_file("hang", reader).outcome == "hang"
-        assert read_misbehaving_file("fine", reader).outcome == "read"
-        assert reader.start_count == 2
+def test_a_hanging_process_is_restarted(reader: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert read_misbehaving_file("fine", reader).outcome == "read"
+    start_count = reader.start_count
+    monkeypatch.setattr(reader, "seconds", 0.3)
+    assert read_misbehaving_file("hang", reader).outcome == "hang"
+    assert read_misbehaving_file("fine", reader).outcome == "read"
+    assert reader.start_count == start_count + 1
 
 
 def test_findings_with_the_same_cause_are_counted_as_one() -> None:
@@ -130,6 +138,13 @@ def test_a_saved_finding_can_be_loaded(tmp_path: Path) -> None:
     assert "Traceback" in (folder / "finding.txt").read_text()
 
 
+@pytest.fixture
+def shared_process(reader: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the command use the process of the other tests."""
+    monkeypatch.setattr(importers, "Reader", lambda seconds: contextlib.nullcontext(reader))
+
+
+@pytest.mark.usefixtures("shared_process")
 def test_saved_findings_are_read_again_by_an_option(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -145,7 +160,7 @@ def test_saved_findings_are_read_again_by_an_option(
     assert importers.main(["--again", str(folders[0])]) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("shared_process")
 def test_the_command_fuzzes_a_format_and_rejects_unknown_ones(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
