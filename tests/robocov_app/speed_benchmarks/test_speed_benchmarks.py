@@ -144,15 +144,22 @@ def build_small_map(
 
 @pytest.fixture
 def small_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each part of the benchmark takes about a second."""
+    """Each part of the benchmark takes less than a second, apart from the start of processes."""
     monkeypatch.setattr(step, "GOALS", {6: step.GOALS[6]})
     monkeypatch.setattr(step, "BATCH_RUNS", 2)
     monkeypatch.setattr(step, "WARM_UP_STEPS", 2)
+    monkeypatch.setattr(step, "_QUICK_ROUNDS", 5)
     monkeypatch.setattr(cost, "EARLIER_RATIOS", {("rooms", 64, 6): 4.5})
+    monkeypatch.setattr(cost, "QUICK_SIZES", ((64, 20),))
+    monkeypatch.setattr(cost, "_QUICK_DURATION_S", 0.02)
     monkeypatch.setattr(cost, "build_random_map", lambda vertices: build_small_map(vertices))
     monkeypatch.setattr(learning, "ENVIRONMENTS", 2)
+    monkeypatch.setattr(learning, "_QUICK_ROUNDS", 2)
     monkeypatch.setattr(processes, "MAPS", ("square",))
     monkeypatch.setattr(processes, "DURATION_S", 1.0)
+    monkeypatch.setattr(processes, "WORKERS", 1)
+    monkeypatch.setattr(processes, "_BASELINE_REPEATS", 1)
+    monkeypatch.setattr(processes, "_QUICK_START_ROUNDS", 1)
     monkeypatch.setattr(processes, "COMMANDS", {"import robocov": ("-c", "import robocov")})
     monkeypatch.setattr(
         render, "list_cases", lambda quick: [partial(render._measure_frames, "rooms", 6, quick=quick)]
@@ -224,7 +231,7 @@ def test_without_the_baseline_the_message_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, "skfmm", None)
     assert "pip install 'robocov[bench]'" in read_error(capsys, "bench", "cost")
     monkeypatch.setattr(processes, "list_start_cases", lambda quick: [])
-    for part in (step, render, window, learning):
+    for part in (step, processes, render, window, learning):
         monkeypatch.setattr(part, "list_cases", lambda quick: [])
     # With all parts, only the ratios are missing.
     assert main(["bench", "all", "--quick", "--json"]) == 0
