@@ -21,6 +21,9 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.setup.missing_controller import MissingController
 from robocov_app.viewer.window.window import ViewerWindow
 
+# One worker makes the results.
+pytestmark = pytest.mark.xdist_group("foreign results")
+
 SHORT = ("--duration", "0.5", "--dt", "0.05", "--lattice", "8", "--robots", "2", "--size", "320x240")
 SMALL = ("--size", "320x240", "--fps", "2", "--video-speed", "1")
 STUDY = """

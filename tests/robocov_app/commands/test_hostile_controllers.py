@@ -13,6 +13,7 @@ import pytest
 from command_calls import COMMAND
 
 from robocov.text import escape_controls
+from robocov_app.cli import main
 from robocov_app.terminal.supervision import find_user_controllers
 
 HEAD = """
@@ -34,12 +35,14 @@ class Mine:
         return 0.0, 0.0
 """
 SMALL = ["--duration", "0.3", "--robots", "2", "--lattice", "16", "--no-figures", "--out", "out"]
-EXITS = {
+RAISED_EXITS = {
     "sys.exit()": "it tried to terminate Python by raising SystemExit (mine.py, line 16) for robot 1 at 0.",
-    "sys.exit(0)": "'Mine': it tried to terminate Python by raising SystemExit: 0 (mine.py, line 16)",
     "raise Odd('hm')": "'Mine': it tried to terminate Python by raising Odd: hm (mine.py, line 16)",
     "raise GeneratorExit": "'Mine': it tried to terminate Python by raising GeneratorExit (mine.py, line 16)",
     "raise KeyboardInterrupt": "it tried to terminate Python by raising KeyboardInterrupt (mine.py, line 16)",
+}
+EXITS = {
+    "sys.exit(0)": "'Mine': it tried to terminate Python by raising SystemExit: 0 (mine.py, line 16)",
     "sys.stdout.close()": "controller mine.py:Mine: it closed the standard output",
     "os.close(1)": "controller mine.py:Mine: it closed the standard output",
     "os.close(2)": "controller mine.py:Mine: it closed the standard error",
@@ -58,20 +61,25 @@ EXCEPTIONS = {
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def run_command(folder: Path, body: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+def write_controller(folder: Path, body: str) -> None:
     (folder / "mine.py").write_text(HEAD.replace("BODY", body))
+
+
+def run_command(folder: Path, body: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    write_controller(folder, body)
     return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
 
 
-def read_error_line(result: subprocess.CompletedProcess[str]) -> str:
-    assert "Traceback" not in result.stderr
-    assert "fault of robocov" not in result.stderr
-    errors = [line for line in result.stderr.splitlines() if line.startswith("robocov: error: ")]
-    assert len(errors) == 1, result.stderr
+def find_error_line(messages: str) -> str:
+    assert "Traceback" not in messages
+    assert "fault of robocov" not in messages
+    errors = [line for line in messages.splitlines() if line.startswith("robocov: error: ")]
+    assert len(errors) == 1, messages
     assert escape_controls(errors[0]) == errors[0]
     return errors[0]
 
@@ -81,15 +89,19 @@ def read_error_line(result: subprocess.CompletedProcess[str]) -> str:
 def test_a_controller_that_terminates_python_is_reported_in_one_line(folder: Path, body: str) -> None:
     result = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
     assert result.returncode == 1, result.stderr
-    assert (EXITS | TERMINATIONS)[body] in read_error_line(result)
+    assert (EXITS | TERMINATIONS)[body] in find_error_line(result.stderr)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("body", EXCEPTIONS)
-def test_a_failing_controller_is_reported_in_one_line(folder: Path, body: str) -> None:
-    result = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
-    assert result.returncode == 2, result.stderr
-    assert EXCEPTIONS[body] in read_error_line(result)
+@pytest.mark.parametrize(
+    ("body", "status"), [*((body, 1) for body in RAISED_EXITS), *((body, 2) for body in EXCEPTIONS)]
+)
+def test_a_failing_controller_is_reported_in_one_line(
+    folder: Path, body: str, status: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_controller(folder, body)
+    assert main(["run", "square", "--controller", "mine.py:Mine", *SMALL]) == status
+    assert (RAISED_EXITS | EXCEPTIONS)[body] in find_error_line(capsys.readouterr().err)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
@@ -98,7 +110,7 @@ def test_a_comparison_terminated_by_a_controller_is_reported(folder: Path) -> No
         folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL
     )
     assert result.returncode == 1
-    assert TERMINATIONS["os._exit(0)"] in read_error_line(result)
+    assert TERMINATIONS["os._exit(0)"] in find_error_line(result.stderr)
 
 
 @pytest.mark.parametrize("words", [["--controller", "mine.py:Mine"], ["--controller=mine.py:Mine"]])
@@ -113,15 +125,14 @@ def test_supervision_does_not_change_the_output_of_a_correct_controller(folder: 
     assert result.stdout.startswith('{"out": "out"')
     wrong = run_command(folder, "pass", "run", "square", "--controller", "mine.py:Yours", *SMALL)
     assert wrong.returncode == 2
-    assert "unknown class 'Yours' (known: Mine" in read_error_line(wrong)
+    assert "unknown class 'Yours' (known: Mine" in find_error_line(wrong.stderr)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("body", ["os._exit(0)", "os.kill(os.getpid(), signal.SIGKILL)"])
-def test_a_sweep_reports_the_controller_that_ends_its_worker(folder: Path, body: str) -> None:
+def test_a_sweep_reports_the_controller_that_ends_its_worker(folder: Path) -> None:
     study = 'maps = ["square"]\ncontrollers = ["mine.py:Mine"]\nduration = 0.3\nrobots = 2\nlattice = 16\n'
     (folder / "study.toml").write_text(study)
-    result = run_command(folder, body, "sweep", "study.toml", "--workers", "1", "--out", "out")
+    result = run_command(folder, "os._exit(0)", "sweep", "study.toml", "--workers", "1", "--out", "out")
     assert result.returncode == 1
     row = (folder / "out" / "results.csv").read_text().splitlines()[1]
     assert "mine.py:Mine" in row and "its process ended (" in row
