@@ -11,7 +11,7 @@ PAGE = read_handbook_page("robots")
 
 
 @pytest.mark.slow
-def test_the_code_prints_the_results_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_code_runs_and_prints_the_results_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     for block in find_code_blocks(PAGE):
         if block.language == "python":
