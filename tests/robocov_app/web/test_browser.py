@@ -190,19 +190,28 @@ def test_a_saved_session_is_downloaded(browser, rooms, tmp_path):
     browser.wait_until(lambda: list(downloads.glob("*.robocov")))
 
 
-@pytest.fixture
-def second_page(browser, rooms):
+@contextmanager
+def open_second_page(browser, link):
     """Open a second page of the teacher, which watches, and yield the handle of the first one."""
     teacher = browser.driver.current_window_handle
     browser.driver.switch_to.new_window("tab")
     browser.resize(1280, 720)
-    browser.driver.get(rooms)
+    browser.driver.get(link)
     browser.wait_until(lambda: "Teacher 1 controls" in read_summary(browser))
     browser.wait_until(lambda: get_classes(browser) == {"watching"})
-    yield teacher
-    if len(browser.driver.window_handles) > 1:
-        browser.driver.close()
-        browser.driver.switch_to.window(teacher)
+    try:
+        yield teacher
+    finally:
+        if len(browser.driver.window_handles) > 1:
+            browser.driver.close()
+            browser.driver.switch_to.window(teacher)
+
+
+@pytest.fixture
+def second_page(browser, shared_rooms, unchanged_rooms):
+    """Open a second page of the shared window, and yield the handle of the first one."""
+    with open_second_page(browser, shared_rooms) as teacher:
+        yield teacher
 
 
 def test_a_page_of_another_shape_shows_the_map_of_the_window(browser, second_page):
@@ -211,11 +220,12 @@ def test_a_page_of_another_shape_shows_the_map_of_the_window(browser, second_pag
     browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900])
 
 
-def test_a_person_enters_a_name(browser, second_page):
-    browser.find("summary").click()
-    browser.run_script("prompt = () => 'Ada'")
-    push_button(browser, "#here button", "Rename")
-    browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
+def test_a_person_enters_a_name(browser, rooms):
+    with open_second_page(browser, rooms):
+        browser.find("summary").click()
+        browser.run_script("prompt = () => 'Ada'")
+        push_button(browser, "#here button", "Rename")
+        browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
 
 
 def test_a_teacher_takes_control_in_a_second_page_until_it_is_closed(browser, second_page):
@@ -372,37 +382,35 @@ def has_request(message):
     return any(person["requests_control"] for person in message.get("participants", ()))
 
 
-def test_the_buttons_of_a_lesson_are_covered_on_pages_that_watch(browser, tmp_path):
+def open_lesson(browser, link):
+    """Open a page that watches a lesson."""
+    browser.driver.get(read_watch_link(link))
+    browser.wait_until(lambda: browser.find("#spectator").text == "Teacher 1 leads the lesson")
+
+
+def show_question(browser, teacher):
+    """Show the first question of a lesson, and return the element with its answers."""
+    answers = browser.find("#answers")
+    for _ in range(2):  # The third chapter asks a question.
+        teacher.press_key("ArrowRight")
+    browser.wait_until(answers.is_displayed)
+    return answers
+
+
+def test_pages_that_watch_a_lesson_have_no_buttons_and_answers_are_plain_text(browser, tmp_path):
     browser.resize(1280, 720)
     with (
         serve_window("demo", "--tour", "--folder", str(tmp_path)) as link,
         connect_page(link) as teacher,
     ):
         teacher.report_page(1280, 720)
-        browser.driver.get(read_watch_link(link))
-        browser.wait_until(lambda: browser.find("#spectator").text == "Teacher 1 leads the lesson")
+        open_lesson(browser, link)
         left, top, width, height = browser.measure("#spectator")
         assert left > 900
         assert top > 600
         assert left + width == 1280
         assert top + height == 720
-        teacher.pass_control(2)
-        browser.wait_until(lambda: not browser.find("#spectator").is_displayed())
-
-
-def test_answers_of_a_lesson_are_plain_text_on_pages_that_watch(browser, tmp_path):
-    browser.resize(1280, 720)
-    with (
-        serve_window("demo", "--tour", "--folder", str(tmp_path)) as link,
-        connect_page(link) as teacher,
-    ):
-        teacher.report_page(1280, 720)
-        browser.driver.get(read_watch_link(link))
-        browser.wait_until(lambda: browser.find("#spectator").is_displayed())
-        answers = browser.find("#answers")
-        for _ in range(2):  # The third chapter asks a question.
-            teacher.press_key("ArrowRight")
-        browser.wait_until(answers.is_displayed)
+        answers = show_question(browser, teacher)
         assert len(browser.find_all("#answers li")) > 1
         assert answers.text
         left, _, width, height = browser.measure("#answers")
@@ -411,25 +419,26 @@ def test_answers_of_a_lesson_are_plain_text_on_pages_that_watch(browser, tmp_pat
         assert height == browser.run_script("return arguments[0].scrollHeight", answers), "all is visible"
         teacher.pass_control(2)
         browser.wait_until(lambda: not answers.is_displayed())
+        browser.wait_until(lambda: not browser.find("#spectator").is_displayed())
 
 
-@pytest.mark.parametrize("size", [(1000, 640), (1137, 701), (1700, 1000)])
-def test_nothing_of_the_answers_shows_on_pages_that_watch_in_another_size(browser, tmp_path, size):
-    browser.resize(*size)
+def test_nothing_of_the_answers_shows_on_pages_that_watch_in_other_sizes(browser, tmp_path):
     with (
         serve_window("demo", "--tour", "--folder", str(tmp_path)) as link,
         connect_page(link) as teacher,
     ):
         teacher.report_page(1280, 720)
-        browser.driver.get(read_watch_link(link))
-        browser.wait_until(lambda: browser.find("#spectator").is_displayed())
-        answers = browser.find("#answers")
-        for _ in range(2):  # The third chapter asks a question.
-            teacher.press_key("ArrowRight")
-        browser.wait_until(answers.is_displayed)
-        assert measure_contrast_around_answers(browser) <= MAX_NOISE
-        browser.run_script("arguments[0].style.visibility = 'hidden'", answers)
-        assert measure_contrast_around_answers(browser, inset=8) > MAX_NOISE, "the picture has frames there"
+        browser.resize(1000, 640)
+        open_lesson(browser, link)
+        answers = show_question(browser, teacher)
+        for size in ((1000, 640), (1137, 701), (1700, 1000)):
+            browser.resize(*size)
+            wait_for_unchanged_picture(browser)
+            assert measure_contrast_around_answers(browser) <= MAX_NOISE, size
+            browser.run_script("arguments[0].style.visibility = 'hidden'", answers)
+            contrast = measure_contrast_around_answers(browser, inset=8)
+            assert contrast > MAX_NOISE, "the picture has frames there"
+            browser.run_script("arguments[0].style.visibility = ''", answers)
 
 
 def measure_contrast_around_answers(browser, inset=0):
@@ -572,14 +581,10 @@ def wait_for_message(browser, text):
     browser.wait_until(lambda: text in read_status(browser))
 
 
-def test_a_drag_with_alt_copies_an_obstacle(browser, rooms):
+def test_drags_with_modifiers_copy_and_select_obstacles(browser, rooms):
     alt = 1
     browser.drag((738, 160), (729, 190), (719, 215), modifiers=alt)  # the round table
     wait_for_message(browser, "copied")
-    assert browser.read_console() == []
-
-
-def test_a_drag_with_shift_selects_obstacles(browser, rooms):
     shift = 8
     browser.drag((639, 90), (739, 200), (824, 248), modifiers=shift)  # from the floor of a room
     wait_for_message(browser, "selected")
@@ -598,13 +603,28 @@ def show_on_phone(browser, link):
         assert browser.read_console() == []
 
 
+@pytest.fixture(scope="module")
+def rooms_for_buttons(tmp_path_factory):
+    """Serve a window of the map Rooms for the tests of buttons, and yield its link."""
+    folder = tmp_path_factory.mktemp("rooms")
+    with serve_window("demo", "rooms", "--paused", "--folder", str(folder)) as link:
+        yield link
+
+
 @pytest.fixture
-def phone(browser, tmp_path):
+def separate_phone(browser, tmp_path):
     """Show a new window of the map Rooms on a phone."""
     with (
         serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link,
         show_on_phone(browser, link) as phone,
     ):
+        yield phone
+
+
+@pytest.fixture
+def phone(browser, rooms_for_buttons):
+    """Show a window of the map Rooms on a phone. Each test undoes what it has changed."""
+    with show_on_phone(browser, rooms_for_buttons) as phone:
         yield phone
 
 
@@ -707,22 +727,23 @@ def test_the_bar_of_a_phone_plays_and_pauses(phone):
     phone.wait_until(lambda: phone.find("#play").text == "Play")
 
 
-def test_the_bar_of_a_phone_shows_the_chosen_tool(phone):
-    phone.find("#to-tools").click()
-    phone.find("[data-command='tool:failure']").click()
-    button = phone.find("#to-tools")
-    phone.wait_until(lambda: button.get_attribute("aria-label") == "Tools: Fail robot")
-    assert button.text == "Tools", "users find it again"
-
-
 def list_lit_buttons(browser):
     """Return the labels of the buttons in the bar of a phone that are highlighted."""
     return [button.text for button in browser.find_all("#touch button.lit")]
 
 
-def test_one_button_of_the_bar_of_a_phone_is_lit(phone):
-    phone.find("#to-tools").click()
-    phone.find("[data-command='tool:failure']").click()
+def choose_tool(browser, name, label):
+    """Choose a tool on a phone, and wait until the button of the tools has a label."""
+    browser.find("#to-tools").click()
+    browser.find(f"[data-command='tool:{name}']").click()
+    button = browser.find("#to-tools")
+    browser.wait_until(lambda: button.get_attribute("aria-label") == label)
+
+
+def test_the_bar_of_a_phone_shows_the_chosen_tool_and_lights_one_button(phone):
+    assert list_lit_buttons(phone) == []
+    choose_tool(phone, "failure", "Tools: Fail robot")
+    assert phone.find("#to-tools").text == "Tools", "users find it again"
     phone.wait_until(lambda: list_lit_buttons(phone) == ["Tools"])
     phone.find("#panel").click()
     phone.wait_until(lambda: list_lit_buttons(phone) == ["Settings"])
@@ -730,6 +751,9 @@ def test_one_button_of_the_bar_of_a_phone_is_lit(phone):
     assert list_lit_buttons(phone) == ["More"]
     phone.find("#to-more").click()
     assert list_lit_buttons(phone) == ["Settings"]
+    phone.find("#panel").click()
+    phone.wait_until(lambda: list_lit_buttons(phone) == ["Tools"])
+    choose_tool(phone, "hand", "Tools")
 
 
 def locate_bar_buttons(browser):
@@ -738,18 +762,22 @@ def locate_bar_buttons(browser):
     return {button.text: button.rect["x"] for button in buttons if button.is_displayed()}
 
 
-def test_buttons_of_a_phone_stay_in_place_when_there_are_files_to_download(phone):
-    before = locate_bar_buttons(phone)
-    phone.find("#to-more").click()
-    sheet = {button.text: button.rect for button in phone.find_all("#more button") if button.is_displayed()}
-    push_button(phone, "#more button", "Save")
-    phone.wait_until(lambda: "saved" in get_classes(phone))
-    assert locate_bar_buttons(phone) == before
-    phone.find("#to-more").click()
-    for button in phone.find_all("#more button"):
+def test_buttons_of_a_phone_stay_in_place_when_there_are_files_to_download(separate_phone):
+    before = locate_bar_buttons(separate_phone)
+    separate_phone.find("#to-more").click()
+    sheet = {
+        button.text: button.rect
+        for button in separate_phone.find_all("#more button")
+        if button.is_displayed()
+    }
+    push_button(separate_phone, "#more button", "Save")
+    separate_phone.wait_until(lambda: "saved" in get_classes(separate_phone))
+    assert locate_bar_buttons(separate_phone) == before
+    separate_phone.find("#to-more").click()
+    for button in separate_phone.find_all("#more button"):
         assert button.text == "Download" or button.rect == sheet[button.text]
-    push_button(phone, "#more button", "Download")
-    assert phone.find("#saved a").text == "rooms-1.robocov"
+    push_button(separate_phone, "#more button", "Download")
+    assert separate_phone.find("#saved a").text == "rooms-1.robocov"
 
 
 def test_the_bar_of_a_phone_undoes_an_edit(phone):
@@ -767,6 +795,8 @@ def test_the_bar_of_a_phone_opens_the_lesson_in_place_of_the_panel(phone):
     phone.find("#lesson").click()
     phone.wait_until(lambda: phone.find("#lesson").get_attribute("aria-pressed") == "true")
     assert not phone.find("#panel").is_enabled()
+    phone.find("#lesson").click()
+    phone.wait_until(lambda: phone.find("#panel").is_enabled())
 
 
 class PhoneEditor:
