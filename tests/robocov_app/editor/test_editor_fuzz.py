@@ -17,7 +17,7 @@ from robocov_app.editor.model.sketch import dump_sketch
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.typed_commands import TYPED_COMMANDS
 
-EVENTS_PER_SEED = 2_500
+EVENTS_PER_SEED = 1_500
 EVENTS_PER_STEP = 6
 STEPS_PER_FRAME = 5
 MAX_RUNS = {

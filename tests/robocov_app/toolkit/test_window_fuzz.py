@@ -20,7 +20,7 @@ from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.viewer.costs.costs import Costs
 
-N_EVENTS = 3_000
+N_EVENTS = 2_000
 N_EVENTS_IN_FAST_TESTS = 150
 SEED = 1
 
