@@ -207,6 +207,9 @@ def test_robots_of_the_learned_controller_decide_by_their_own_observations(track
 
 
 QUICK_SHARED_RUN = ("greedy-submodular", "lossy")
+SIMILAR_CONTROLLERS = ("frontier-median", "voronoi-graph")
+"""Controllers that share maps by the same code as `greedy-submodular`, which runs on all tracks."""
+TRACKS_WITHOUT_SOME_MESSAGES = ("short-range", "lossy")
 SHARED_RUNS = [
     pytest.param(
         name,
@@ -215,7 +218,7 @@ SHARED_RUNS = [
         marks=[] if (name, track) == QUICK_SHARED_RUN else [pytest.mark.slow],
     )
     for name, kind in CONTROLLERS.items()
-    for track in TRACKS
+    for track in (TRACKS_WITHOUT_SOME_MESSAGES if name in SIMILAR_CONTROLLERS else TRACKS)
     if kind.information == "shared map"
 ]
 
@@ -561,6 +564,8 @@ class Mine:
 def test_a_controller_that_knows_the_suite_is_not_verified(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # Better references would change the gaps on new maps only a little.
+    monkeypatch.setattr(verification, "RESTARTS", 2)
     folder, name = rate(tmp_path, ON_UNKNOWN_MAPS, "ideal")
     names = [name for kind in ("polygons", "blocks", "homes", "plants") for name in suite.FAMILIES[kind]]
     track = replace(suite.TRACKS["ideal"], maps=tuple(names))
@@ -575,10 +580,10 @@ def test_a_controller_that_knows_the_suite_is_not_verified(
         placed = {**row, "map": map_name, "mean_distance_m": cost}
         result["rows"].append({**placed, **compute_gaps("ideal", map_name, placed)})
     (folder / RESULT_FILE).write_text(json.dumps(result))
-    verification = verify(folder, name, VerificationOptions(sample=0, robots=0, new_maps=4, workers=2))
-    assert verification.comparison is not None and verification.comparison.suite_gap == 0.0
-    assert verification.new_map_track == "ideal"
-    (difference,) = verification.differences
+    verified = verify(folder, name, VerificationOptions(sample=0, robots=0, new_maps=4, workers=2))
+    assert verified.comparison is not None and verified.comparison.suite_gap == 0.0
+    assert verified.new_map_track == "ideal"
+    (difference,) = verified.differences
     assert difference.endswith("the controller or its gains are fitted to the maps of the suite")
 
 
