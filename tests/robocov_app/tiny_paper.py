@@ -6,7 +6,7 @@ from robocov_app.terminal.interruption import Interruption
 
 TINY = Plan(
     name="quick",
-    duration=2.0,
+    duration=1.0,
     dt=0.05,
     bundled=("blocks-a",),
     generated=(1,),
@@ -36,8 +36,8 @@ TINY = Plan(
         map_starts=("corner",),
         conditions_maps=("rooms",),
         conditions_seeds=1,
-        conditions_duration=1.0,
-        probe=2.0,
+        conditions_duration=0.2,
+        probe=1.0,
         worst=1,
         warm_up=1,
         blocks=2,

@@ -24,6 +24,7 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
+from robocov_app.evaluation.reference_search import ReferenceSearch
 from robocov_app.figures.files import save_figure
 from robocov_app.replication.claims import judge_beyond_claims, judge_paper_claims
 from robocov_app.replication.claims.claim import EXTENSIONS, GOALS, RIVALS
@@ -42,7 +43,7 @@ from robocov_app.replication.figures.figure_files import FigureFile
 from robocov_app.replication.figures.paper_figures import CAPTIONS, describe_figure, find_arrival_time
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.pages import study_pages
-from robocov_app.replication.results import controller_speed
+from robocov_app.replication.results import controller_speed, references
 from robocov_app.sweep import sweeping
 from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import generate_tasks
@@ -55,6 +56,15 @@ RUN_COUNT = 142
 TINY_COMMAND = Path(__file__).parents[1] / "tiny_paper_command.py"
 
 
+def search_in_this_process(queries, workers, stop):
+    """Yield the answers of a reference search in this process."""
+    search = ReferenceSearch()
+    for name, query in queries.items():
+        if stop.requested:
+            return
+        yield name, search([query], None)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def reduced_study():
     """Reduce the gain grids and speed measurements to a minimum, and run tasks in this process."""
@@ -63,16 +73,17 @@ def reduced_study():
         grids[name] = (GAIN_GRIDS[name][0], GAIN_GRIDS[name][-1])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contenders, "GAIN_GRIDS", grids)
-        patch.setattr(controller_speed, "STEPS_PER_BLOCK", 3)
-        # Without starting processes, whose imports take longer than their runs.
+        patch.setattr(controller_speed, "STEPS_PER_BLOCK", 1)
+        # Without starting processes, whose imports take longer than their runs and searches.
+        patch.setattr(references, "answer_queries", search_in_this_process)
         patch.setattr(runner, "LocalPool", DirectExecutor)
         patch.setattr(sweeping, "LocalPool", DirectExecutor)
         yield
 
 
 def save_selected_image(figure, path):
-    """Save PNG images and `SAVED_FIGURES`. The others are empty: tests/bench/quick_paper.py saves them."""
-    if path.suffix == ".png" or path.name in SAVED_FIGURES:
+    """Save light PNG images and `SAVED_FIGURES`; tests/bench/quick_paper.py saves all figures."""
+    if (path.suffix == ".png" and not path.stem.endswith("-dark")) or path.name in SAVED_FIGURES:
         save_figure(figure, path)
     else:
         path.touch()
@@ -532,7 +543,7 @@ class TestPages:
             f"{paper.runs} runs; 0 failed",
             *(
                 "0.05 s",
-                "2 s each",
+                "1 s each",
                 "(seeds 101, 102)",
                 "with polygons (seeds 1)",
                 "k_rep 0.3, 3 N m³",
