@@ -1,14 +1,16 @@
 """Playing of lessons: session files with chapters that play, ask questions, and set tasks."""
 
+import math
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
+from robocov.cost import CoverageCost, TimeVaryingCost
+from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
-from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.key_hints import explain_kept_edits, explain_lesson_repetition
 from robocov_app.viewer.lessons.suspended_session import SuspendedSession
 from robocov_app.viewer.presenter import Presenter
@@ -538,7 +540,7 @@ class _DistanceSampler:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._costs = Costs(direct=True)
+        self._cost: TimeVaryingCost | None = None
         self._environment: Environment | None = None
         self._radius = 0.0
 
@@ -549,19 +551,20 @@ class _DistanceSampler:
         curve = pane.distance_curve
         if len(curve) and timeline.end_time < curve.last_time + _DISTANCE_INTERVAL_S:
             return
+        result = self._get_cost().evaluate_all_robots(timeline.end_time, pane.positions)
+        # Robots at positions that are not free have no cost.
+        if result is not None and math.isfinite(result.mean_distance):
+            curve.add(timeline.end_time, result.mean_distance)
+
+    def _get_cost(self) -> TimeVaryingCost:
+        """Return the cost on the present map, which is built again when the map or the team changes."""
         environment = self._session.displayed.environment
-        radius = pane.setup.team.min_radius
-        if environment is not self._environment or radius != self._radius:
+        radius = min(pane.setup.team.min_radius for pane in self._session.timeline.panes)
+        if self._cost is None or environment is not self._environment or radius != self._radius:
             self._environment = environment
             self._radius = radius
-            self._costs.set_environment(environment, radius)
-        self._costs.request(pane.number, timeline.end_time, pane.positions)
-        for _, known_cost in self._costs.poll():
-            curve.add(known_cost.time, known_cost.result.mean_distance)
-
-    def close(self) -> None:
-        """End the computation of costs."""
-        self._costs.close()
+            self._cost = TimeVaryingCost(CoverageCost(environment, DEFAULT_LATTICE, radius=radius))
+        return self._cost
 
 
 @dataclass(frozen=True)
@@ -620,18 +623,14 @@ def _play_chapter(session: Session, chapter: ChapterModel) -> bool:
     # No other condition needs the mean distance, which takes long to compute.
     if chapter.until.mean_distance_below is not None:
         sampler = _DistanceSampler(session)
-    try:
-        while True:
-            if sampler is not None:
-                sampler.update()
-            if is_fulfilled(chapter.until, session):
-                return True
-            if session.timeline.end_time >= MAX_TASK_S:
-                return False
-            session.playback.step()
-    finally:
+    while True:
         if sampler is not None:
-            sampler.close()
+            sampler.update()
+        if is_fulfilled(chapter.until, session):
+            return True
+        if session.timeline.end_time >= MAX_TASK_S:
+            return False
+        session.playback.step()
 
 
 def _check_edit_was_made(
