@@ -21,7 +21,7 @@ from robocov_app.replication.claims.registration import load_registration
 from robocov_app.replication.design import plan
 
 MAP_COUNT = 12
-"""Number of maps of each claim in the quick study, whether they are convex or not."""
+"""Number of maps, convex or not, behind each claim of the quick study."""
 
 
 def test_the_quick_study_confirms_the_clear_claims(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,14 +41,13 @@ ADDED_OPTIONS = {"run": SHORT_RUN, "compare": SHORT_RUN, "optimum": ("--lattice"
 """Options that make a command faster."""
 FIGURE_COMMANDS = ("run", "compare")
 """Commands that save figures, which take longer than short runs."""
-PAGE_WITH_FIGURES = "first-run"
-"""Page whose commands also save their figures here."""
+PAGES_WITH_FIGURES = ("first-run", "density", "own-controller")
+"""Pages whose commands also save their figures here."""
 PAGE_WITH_CHECKED_CODE = "robots"
 """Page whose Python code another test runs, which also checks what it prints."""
 REPLACEMENTS = {
     ", duration=60)": ", duration=2)",
     "run(60.0)": "run(20.0)",
-    "several, 60.0": "several, 1.0",
     "--study full": "--study quick",
     "seeds = 10 ": "seeds = 1 ",
     "duration = 60.0": "duration = 0.5",
@@ -57,7 +56,7 @@ REPLACEMENTS = {
     "[0.1, 0.3, 1.0]": "[0.1]",
     "lattice=128": "lattice=32",
 }
-"""Parts of the code that would make its run long, and what stands in their places in the test."""
+"""Long-running parts of the code, and their replacements in the test."""
 
 
 @pytest.fixture(autouse=True)
@@ -134,7 +133,7 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path) -> None:
             if page.stem != PAGE_WITH_CHECKED_CODE:
                 exec(code, names)
         elif block.language == "sh":
-            run_commands(code, saves_figures=page.stem == PAGE_WITH_FIGURES)
+            run_commands(code, saves_figures=page.stem in PAGES_WITH_FIGURES)
         else:
             assert block.language in ("text", "bibtex")
 

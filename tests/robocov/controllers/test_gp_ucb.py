@@ -239,7 +239,7 @@ def test_a_team_that_learns_ends_near_one_that_knows_the_density() -> None:
     uniform_costs = []
     learned_costs = []
     informed_costs = []
-    for seed in (1, 2, 4):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         peaks = [Gaussian(tuple(rng.uniform(1.0, 9.0, 2).tolist()), weight=20.0, sigma=1.0) for _ in range(2)]
         density = Gaussians(tuple(peaks), floor=1.0)
@@ -250,5 +250,5 @@ def test_a_team_that_learns_ends_near_one_that_knows_the_density() -> None:
     uniform_cost, learned_cost, informed_cost = np.mean(
         [uniform_costs, learned_costs, informed_costs], axis=1
     ).tolist()
-    assert learned_cost < 0.75 * uniform_cost
-    assert learned_cost < 1.1 * informed_cost
+    assert learned_cost < 0.8 * uniform_cost
+    assert learned_cost < 1.2 * informed_cost

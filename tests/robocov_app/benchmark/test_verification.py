@@ -209,7 +209,8 @@ def test_robots_of_the_learned_controller_decide_by_their_own_observations(track
 QUICK_SHARED_RUN = ("greedy-submodular", "lossy")
 SIMILAR_CONTROLLERS = ("frontier-median", "voronoi-graph")
 """Controllers that share maps by the same code as `greedy-submodular`, which runs on all tracks."""
-TRACKS_WITHOUT_SOME_MESSAGES = ("short-range", "lossy")
+DISTURBED_TRACKS = ("short-range", "lossy", "noisy")
+"""Tracks on which these controllers run: with missing messages, or inexact positions."""
 SHARED_RUNS = [
     pytest.param(
         name,
@@ -218,7 +219,7 @@ SHARED_RUNS = [
         marks=[] if (name, track) == QUICK_SHARED_RUN else [pytest.mark.slow],
     )
     for name, kind in CONTROLLERS.items()
-    for track in (TRACKS_WITHOUT_SOME_MESSAGES if name in SIMILAR_CONTROLLERS else TRACKS)
+    for track in (DISTURBED_TRACKS if name in SIMILAR_CONTROLLERS else TRACKS)
     if kind.information == "shared map"
 ]
 

@@ -39,9 +39,9 @@ RAISED_EXITS = {
     "sys.exit()": "it tried to terminate Python by raising SystemExit (mine.py, line 16) for robot 1 at 0.",
     "raise Odd('hm')": "'Mine': it tried to terminate Python by raising Odd: hm (mine.py, line 16)",
     "raise GeneratorExit": "'Mine': it tried to terminate Python by raising GeneratorExit (mine.py, line 16)",
-    "raise KeyboardInterrupt": "it tried to terminate Python by raising KeyboardInterrupt (mine.py, line 16)",
 }
 EXITS = {
+    "raise KeyboardInterrupt": "it tried to terminate Python by raising KeyboardInterrupt (mine.py, line 16)",
     "sys.exit(0)": "'Mine': it tried to terminate Python by raising SystemExit: 0 (mine.py, line 16)",
     "sys.stdout.close()": "controller mine.py:Mine: it closed the standard output",
     "os.close(1)": "controller mine.py:Mine: it closed the standard output",

@@ -233,7 +233,7 @@ def test_without_the_baseline_the_message_says_how_to_install_it(
     monkeypatch.setattr(processes, "list_start_cases", lambda quick: [])
     for part in (step, processes, render, window, learning):
         monkeypatch.setattr(part, "list_cases", lambda quick: [])
-    # With all parts, only the ratios are missing.
+    # With all parts, the command continues without the ratios.
     assert main(["bench", "all", "--quick", "--json"]) == 0
     output = capsys.readouterr()
     assert "pip install 'robocov[bench]'" in output.err

@@ -182,7 +182,7 @@ def test_a_page_opens_its_window_again_after_a_crash(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-@pytest.mark.parametrize(("signal_number", "is_starting"), [(signal.SIGINT, False), (signal.SIGTERM, True)])
+@pytest.mark.parametrize(("signal_number", "is_starting"), [(signal.SIGINT, True), (signal.SIGTERM, False)])
 def test_a_signal_stops_all_windows_without_a_traceback(tmp_path, is_starting, signal_number):
     process_options = {"stderr": subprocess.PIPE, "start_new_session": True}
     with serve_window(

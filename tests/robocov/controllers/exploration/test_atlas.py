@@ -69,7 +69,7 @@ def run_until(simulation: Simulation, time: float) -> None:
         simulation.step()
 
 
-ONE_RUN = pytest.mark.xdist_group("run of atlas in two rooms")
+SHARES_RUN = pytest.mark.xdist_group("run of atlas in two rooms")
 """Tests of the same run, which one worker executes once."""
 
 
@@ -87,7 +87,7 @@ def final_simulation(finished_run: tuple[Simulation, Record]) -> Simulation:
 
 
 @pytest.mark.slow
-@ONE_RUN
+@SHARES_RUN
 def test_the_team_spreads_to_both_rooms_and_covers_more_than_with_rapf(final_simulation: Simulation) -> None:
     cost = CoverageCost(ROOMS, lattice=32)
     rapf = Simulation(ROOMS, Rapf(), CORNER, dt=0.05)
@@ -98,7 +98,7 @@ def test_the_team_spreads_to_both_rooms_and_covers_more_than_with_rapf(final_sim
 
 
 @pytest.mark.slow
-@ONE_RUN
+@SHARES_RUN
 def test_the_team_comes_to_rest(final_simulation: Simulation) -> None:
     simulation = final_simulation.copy()
     for _ in range(80):
@@ -107,7 +107,7 @@ def test_the_team_comes_to_rest(final_simulation: Simulation) -> None:
 
 
 @pytest.mark.slow
-@ONE_RUN
+@SHARES_RUN
 def test_robots_plan_again_when_all_others_have_come_to_rest(final_simulation: Simulation) -> None:
     """Only then they may relocate, although nothing else has changed."""
     assert all(state.motion.is_idle and state.basis.is_quiet for state in final_simulation.memory.states)
@@ -132,7 +132,7 @@ def test_robots_that_turn_close_to_a_narrow_gap_do_not_touch_its_rim() -> None:
 
 
 @pytest.mark.slow
-@ONE_RUN
+@SHARES_RUN
 def test_robots_move_without_contacts(finished_run: tuple[Simulation, Record]) -> None:
     _, record = finished_run
     clearance = compute_clearances(record)
@@ -471,7 +471,7 @@ def crosses_door(seed: int) -> bool:
 @pytest.mark.slow
 def test_robots_cross_doors_that_are_wide_enough() -> None:
     # One exception is allowed: trajectories depend on how processors round, and a run takes only 30 s.
-    assert sum(crosses_door(seed) for seed in range(6)) >= 5
+    assert sum(crosses_door(seed) for seed in range(12)) >= 11
 
 
 def compute_cost(simulation: Simulation) -> float:
@@ -480,12 +480,18 @@ def compute_cost(simulation: Simulation) -> float:
 
 
 @pytest.mark.slow
-@ONE_RUN
-def test_more_robots_and_longer_ranges_do_not_cover_less(final_simulation: Simulation) -> None:
+@SHARES_RUN
+def test_more_robots_and_longer_ranges_do_not_cover_less(
+    final_simulation: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Others may not cover less after half the time. The larger team exceeds the planning group."""
     cost = compute_cost(final_simulation)
+    for module in (atlas, team_knowledge):
+        monkeypatch.setattr(module, "MAX_PLANNING_GROUP", 4)
     larger_team = Simulation(ROOMS, Atlas(), [*CORNER, [1.8, 0.8]], dt=0.05)
     run_until(larger_team, 25.0)
     assert compute_cost(larger_team) < 1.01 * cost
+    monkeypatch.undo()
     short_ranges = Team.homogeneous(4, communication_range=3.0)
     separate_team = Simulation(ROOMS, Atlas(), CORNER, short_ranges, dt=0.05)
     run_until(separate_team, 25.0)
