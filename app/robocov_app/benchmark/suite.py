@@ -156,7 +156,7 @@ TRACKS: Mapping[str, Track] = {
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
     "plans-one-robot": Track(
-        "large plans, the same as those of plans-small", _PLANS[0], robots=1, duration=240.0, ranking="plans"
+        "large plans, the same maps as plans-small", _PLANS[0], robots=1, duration=240.0, ranking="plans"
     ),
     "plans-small": Track(
         "large plans, unlimited communication", _PLANS[0], robots=3, duration=240.0, ranking="plans"

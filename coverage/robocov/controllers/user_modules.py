@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
-from robocov.files.strictjson import is_existing_file
+from robocov.files.paths import is_existing_file
 
 MODULE_PREFIX = "robocov_user_"
 """Prefix of the names of modules that are loaded from users' files."""

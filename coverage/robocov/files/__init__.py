@@ -9,5 +9,6 @@
 - `result_folder`: folders of results that are replaced atomically
 - `result_names`: names of the files in the folder of a result
 - `folder_lock`: locks on folders
+- `paths`: checks of paths from users
 - `cache_folders`: folders of caches
 """

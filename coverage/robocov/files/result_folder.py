@@ -364,11 +364,12 @@ def require_result(folder: Path, expected: str, files: Sequence[str]) -> None:
     try:
         if any((folder / file).is_file() for file in files):
             return
+        is_folder = folder.is_dir()
         actual = describe_path(folder)
     except OSError as error:
         # The user may have no permission to read the folder, or its name may be too long.
         raise InputError(f"{folder}: cannot be read: {describe_error(error)}") from error
-    if actual == "a folder":
+    if is_folder:
         *first_files, last_file = files
         listing = f"{', '.join(first_files)} or {last_file}" if first_files else last_file
         actual = f"a folder without {listing}"

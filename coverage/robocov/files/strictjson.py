@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import tomllib
 from codecs import BOM_UTF8
@@ -58,23 +57,6 @@ class _Object(dict[str, Any]):
         if len(values) < len(pairs):
             values.duplicate_key = Counter(key for key, _ in pairs).most_common(1)[0][0]
         return values
-
-
-def is_existing_file(path: Path) -> bool:
-    """Return whether a path leads to a file.
-
-    Parameters
-    ----------
-    path : Path
-        Any path, which may not exist.
-
-    Returns
-    -------
-    bool
-        False also if the path is too long for a file, or its folder cannot be accessed. `Path.is_file` raises
-        an error in these cases.
-    """
-    return os.path.isfile(path)  # noqa: PTH113
 
 
 def read_bytes(path: Path) -> bytes:

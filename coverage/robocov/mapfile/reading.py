@@ -19,7 +19,8 @@ from robocov.errors import (
     quote_json,
     to_one_line,
 )
-from robocov.files.strictjson import is_existing_file, locate_issues, parse_json, read_bytes, require_json
+from robocov.files.paths import is_existing_file
+from robocov.files.strictjson import locate_issues, parse_json, read_bytes, require_json
 from robocov.mapfile.density_images import read_gray_levels, read_image_file
 from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
 from robocov.mapfile.rules import check_rules

@@ -134,19 +134,20 @@ class Neighbors:
         robot_count = 0
         robots = []
         neighbors = []
-        ranges = []
+        joined_ranges = []
         for graph in graphs:
             robot, neighbor = graph.list_pairs()
             robots.append(robot + robot_count)
             neighbors.append(neighbor + robot_count)
-            ranges.append(np.full(graph.robot_count, np.inf) if graph.ranges is None else graph.ranges)
+            if graph.ranges is None:
+                joined_ranges.append(np.full(graph.robot_count, np.inf))
+            else:
+                joined_ranges.append(graph.ranges)
             robot_count += graph.robot_count
-        return cls.from_pairs(
-            robot_count,
-            np.concatenate(robots),
-            np.concatenate(neighbors),
-            None if all(graph.ranges is None for graph in graphs) else np.concatenate(ranges),
-        )
+        ranges = None
+        if any(graph.ranges is not None for graph in graphs):
+            ranges = np.concatenate(joined_ranges)
+        return cls.from_pairs(robot_count, np.concatenate(robots), np.concatenate(neighbors), ranges)
 
     @property
     def is_complete(self) -> bool:

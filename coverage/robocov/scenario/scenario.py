@@ -42,7 +42,8 @@ from robocov.errors import (
     require_type,
 )
 from robocov.files.documents import check_header, validate_document
-from robocov.files.strictjson import is_existing_file, parse_json, read_bytes
+from robocov.files.paths import is_existing_file
+from robocov.files.strictjson import parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov.mapfile import find_map_file, from_json, list_bundled_maps, load_map, to_json
 from robocov.record import Record, Recorder
@@ -696,7 +697,7 @@ def _describe_controller(
             # This checks the name and the gains. A controller in a file ("file:class") is only checked when
             # it is needed, because that runs the code of the file.
             make_controller(controller, gains)
-        given_gains = gains or {}
+        given_gains = {} if gains is None else gains
         require_gain_mapping(given_gains)
         plain_gains = {name: to_plain_value(value) for name, value in given_gains.items()}
         _require_finite_gains(plain_gains)

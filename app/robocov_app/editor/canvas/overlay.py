@@ -83,8 +83,8 @@ LENGTH_INK_SHARE = 0.85
 BADGE_EDGE_INK_SHARE = 0.3
 
 GHOST_OPACITY = 130  # of 255
-_CLEAR = (0, 0, 0, 0)
 SELECTION_BOX_OPACITY = 34  # of 255
+_TRANSPARENT = (0, 0, 0, 0)
 TYPED_TEXT_FACTOR = 1.1  # size of typed text, relative to other texts
 TEXT_CURSOR = "▏"
 MAX_SPRITE_RADIUS_PX = 300.0  # larger circles are polygons; sprites are smoother, but large images
@@ -320,7 +320,9 @@ def _fill_translucent_polygon(
         return
     image = Surface(box.size, pygame.SRCALPHA, 32)
     # The polygon has an image of its own, so that the map shows through its holes.
-    for ring, ring_color in [(polygon.exterior, color), *((hole, _CLEAR) for hole in polygon.interiors)]:
+    rings = [polygon.exterior, *polygon.interiors]
+    colors = [color] + [_TRANSPARENT] * len(polygon.interiors)
+    for ring, ring_color in zip(rings, colors, strict=True):
         corners = canvas.camera.to_pixels(np.asarray(ring.coords)[:-1])
         shifted = np.clip(corners - np.array(box.topleft), -MAX_POLYGON_PX, MAX_POLYGON_PX)
         pygame.draw.polygon(image, ring_color, np.rint(shifted).tolist())

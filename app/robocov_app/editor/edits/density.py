@@ -47,9 +47,10 @@ def compute_spread(peak: Gaussian) -> float:
 def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
     """Add a hot spot with a center and standard deviation, m; a map without density gets a floor of 1."""
     # A uniform image is replaced by a floor of the same weight, but areas would be lost.
-    has_areas = isinstance(sketch.density, WeightedPolygons)
-    if isinstance(sketch.density, WeightedPolygons | Raster) and (has_areas or not sketch.density.is_uniform):
-        raise _build_kind_error(sketch.density, "hot spots cannot be added to")
+    density = sketch.density
+    is_varying_image = isinstance(density, Raster) and not density.is_uniform
+    if isinstance(density, WeightedPolygons) or is_varying_image:
+        raise _build_kind_error(density, "hot spots cannot be added to")
     peak = Gaussian(round_map_point(center), _round_weight(weight, MIN_PEAK_WEIGHT), _round_sigma(sigma))
     return _set_features(sketch, (*list_features(sketch), peak), "hot spot added")
 

@@ -20,7 +20,8 @@ from robocov.errors import (
     quote,
     to_one_line,
 )
-from robocov.files.strictjson import is_existing_file, parse_toml, read_bytes
+from robocov.files.paths import is_existing_file
+from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.sweep.study.gains import NO_LIMIT
 from robocov_app.sweep.study.sampling import Range, Sampling, SamplingMethod, Scale

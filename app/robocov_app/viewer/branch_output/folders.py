@@ -1,11 +1,11 @@
 """Folders of the parts of a saved branch, which are listed in ``branch.json``."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 from robocov.errors import InputError, to_one_line
+from robocov.files.paths import is_existing_file
 from robocov.files.result_names import BRANCH_FILE, FORMER_BRANCH_FILE
 from robocov_app.terminal.output import write_json
 
@@ -36,8 +36,7 @@ def find_branch_file(folder: Path) -> Path | None:
         None if this is not the folder of a branch.
     """
     for name in (BRANCH_FILE, FORMER_BRANCH_FILE):
-        # Unlike Path.is_file, this is False for a path that cannot exist, such as one that is too long.
-        if os.path.isfile(folder / name):  # noqa: PTH113
+        if is_existing_file(folder / name):
             return folder / name
     return None
 

@@ -72,7 +72,7 @@ class FrontierMedian(SharedMapController):
     Robots do not wait for frontiers that only robots out of range could reach.
 
     Robots do not tell each other which targets they have visited, so their plans can differ. With a limited
-    communication range, they may leave the last targets to each other until the time for these is over.
+    communication range, they may leave the last targets to each other until these are given up.
     """
 
     name = "frontier-median"

@@ -156,16 +156,12 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
 
 
 def _choose_common_ends(points: AnyArray, tolerance: float) -> IntArray:
-    """Choose where each of n ends moves: return the index of the end whose original position it takes, (n,).
+    """Return the index of the end to whose original position each of n ends moves, (n,).
 
     Parameters
     ----------
     points : (n,) array of shapely points, m
     tolerance : float, m
-
-    Returns
-    -------
-    (n,) array
     """
     first, second = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
     is_same_point = (shapely.distance(points[first], points[second]) == 0.0) & (first != second)
@@ -183,10 +179,8 @@ def _choose_common_ends(points: AnyArray, tolerance: float) -> IntArray:
     # A chain that is close to joints moves with one of them instead: to the lowest of their targets.
     is_near_joint = ~is_joint[first] & is_joint[second]
     near_chains = chains[first[is_near_joint]]
-    joint_targets = targets[second[is_near_joint]]
-    order = np.argsort(joint_targets, kind="stable")
-    joined_chains, rows = np.unique(near_chains[order], return_index=True)
-    chain_targets[joined_chains] = joint_targets[order][rows]
+    chain_targets[near_chains] = len(points)  # above every index
+    np.minimum.at(chain_targets, near_chains, targets[second[is_near_joint]])
     return np.asarray(chain_targets[chains])
 
 
