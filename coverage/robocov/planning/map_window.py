@@ -39,6 +39,8 @@ class UnknownArea(NamedTuple):
     """(p,) Label of the patch, from 1."""
     nodes: IntArray
     """(p,) Index of the node."""
+    counts: FloatArray
+    """(p,) Number of these cells."""
     expected_free_counts: FloatArray
     """(p,) Expected number of free ones among these cells."""
 
@@ -101,6 +103,12 @@ class MapWindow:
         labels, _ = ndimage.label(self.is_unknown & ~self.is_outside)
         return np.asarray(labels)
 
+    @cached_property
+    def free_areas(self) -> IntArray:
+        """Label, from 1, of the connected area of each cell known to be free, (h, w); 0 for other cells."""
+        labels, _ = ndimage.label(self.is_free)
+        return np.asarray(labels)
+
     @property
     def spacing(self) -> float:
         """Distance between neighboring nodes, m."""
@@ -153,10 +161,33 @@ class MapWindow:
         # Each pair of a patch and a node is one number, so that the cells can be grouped by pair.
         node_count = len(self.nodes)
         pairs, index = np.unique(self.patches[rows, columns] * node_count + nodes, return_inverse=True)
-        expected_free_counts = np.bincount(index, self.openness[rows, columns]).astype(np.float64)
         return UnknownArea(
-            patches=pairs // node_count, nodes=pairs % node_count, expected_free_counts=expected_free_counts
+            patches=pairs // node_count,
+            nodes=pairs % node_count,
+            counts=np.bincount(index).astype(np.float64),
+            expected_free_counts=np.bincount(index, self.openness[rows, columns]).astype(np.float64),
         )
+
+    def find_connected(self, positions: FloatArray) -> BoolArray:
+        """Find the positions that cells known to be free connect with the first position.
+
+        Parameters
+        ----------
+        positions : (k, 2) array, m
+
+        Returns
+        -------
+        (k,) bool array
+            False for positions outside the window and in unknown cells.
+        """
+        rows, columns = self.known_map.raster.find_cells(positions)
+        rows = rows - self.window.first_row
+        columns = columns - self.window.first_column
+        height, width = self.free_areas.shape
+        is_inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        areas = np.zeros(len(positions), dtype=np.intp)
+        areas[is_inside] = self.free_areas[rows[is_inside], columns[is_inside]]
+        return np.asarray((areas == areas[0]) & (areas > 0))
 
     def sum_by_node(self, values: FloatArray | BoolArray) -> FloatArray:
         """Sum the values of the cells that each node represents.

@@ -1,10 +1,12 @@
-"""Viewpoints from which a robot can see the unknown parts of its own cell."""
+"""Viewpoints from which a robot can see unknown parts of the region."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.map_window import MapWindow
 from robocov.planning.raster import SIDE_STEPS
 from robocov.typing import FloatArray, IntArray
@@ -12,7 +14,9 @@ from robocov.typing import FloatArray, IntArray
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
 _ADDED_LENGTH_M = 1.0
-"""Length that is added to paths, so that very short ones do not outweigh the expected cost."""
+"""Length that is added to paths, so that very short ones do not outweigh the value of a patch."""
+_MAX_TRIED_POSITIONS = 16
+"""Maximum number of positions in a patch at which another robot is tried."""
 
 
 class _Candidates(NamedTuple):
@@ -26,44 +30,33 @@ class _Candidates(NamedTuple):
 
 def find_viewpoint(
     map_window: MapWindow,
-    cell_distances: FloatArray,
+    patch_values: FloatArray,
     path_lengths: FloatArray,
-    min_cost: float,
     previous_viewpoints: Sequence[FloatArray],
 ) -> FloatArray | None:
-    """Find the best viewpoint from which a robot can look into an unknown patch of its own cell.
+    """Find the best viewpoint from which a robot can look into an unknown patch.
 
     An unknown patch is a connected area of cells of the map that the robot has not seen.
 
     Parameters
     ----------
     map_window : MapWindow
-    cell_distances : (m,) array, m
-        Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
+    patch_values : (p,) array
+        Value of a look into each patch, by label; 0 for patches that are not worth a visit.
     path_lengths : (m,) array, m
-        Distances from the robot to all nodes.
-    min_cost : float
-        Only patches with a larger expected cost (see Notes) are worth a visit. The unit is that of the
-        expected cost: cells times meters.
+        Distances from the robot to all nodes; infinite for nodes at which it does not look for viewpoints.
     previous_viewpoints : sequence of (2,) arrays, m
         Viewpoints that the robot has already visited.
 
     Returns
     -------
     (2,) array or None, m
-        Center of a free cell at the border of the patch. None if no patch is worth a visit.
-
-    Notes
-    -----
-    The expected cost of a patch is its contribution to the coverage cost: the sum, over its cells, of the
-    probability that the cell is free times the distance from the robot's goal in meters. For example, 50
-    cells that are free with probability 0.8, at a mean distance of 3 m, have an expected cost of 120. It is
-    close to zero for the inside of an obstacle. The viewpoint maximizes the expected cost of the patch,
-    divided by (1 m + path length).
+        Center of a free cell at the border of the patch. It maximizes the value of the patch, divided by
+        (1 m + path length). None if no patch is worth a visit.
     """
     frontier = map_window.frontier
-    frontier_costs = _compute_patch_costs(map_window, cell_distances)[frontier.patches]
-    is_worth_visiting = frontier_costs > min_cost
+    frontier_values = patch_values[frontier.patches]
+    is_worth_visiting = frontier_values > 0.0
     if not is_worth_visiting.any():
         return None
     # Candidates are the cells on the four sides of each frontier cell. Only those that are marked in
@@ -74,8 +67,8 @@ def find_viewpoint(
         columns=frontier.columns[is_worth_visiting, None] + columns_right,
     )
     lengths = _get_path_lengths(map_window, path_lengths, candidates)
-    cost_per_length = frontier_costs[is_worth_visiting, None] / (_ADDED_LENGTH_M + lengths)
-    values = frontier.is_side_free[is_worth_visiting] * cost_per_length
+    value_per_length = frontier_values[is_worth_visiting, None] / (_ADDED_LENGTH_M + lengths)
+    values = frontier.is_side_free[is_worth_visiting] * value_per_length
     _exclude_visited(values, map_window, candidates, previous_viewpoints)
     best = values.argmax()
     if not values.flat[best] > 0.0:
@@ -84,13 +77,104 @@ def find_viewpoint(
     return np.asarray(_compute_first_center(map_window) + cell * map_window.known_map.raster.cell_size)
 
 
-def _compute_patch_costs(map_window: MapWindow, cell_distances: FloatArray) -> FloatArray:
-    """Return the expected cost of each unknown patch, by label; see `find_viewpoint`."""
+def compute_patch_costs(map_window: MapWindow, cell_distances: FloatArray) -> FloatArray:
+    """Compute the expected cost of each unknown patch.
+
+    Parameters
+    ----------
+    map_window : MapWindow
+    cell_distances : (m,) array, m
+        Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
+
+    Returns
+    -------
+    (p,) array
+        Expected costs by label, in cells times meters. The label 0 does not occur.
+
+    Notes
+    -----
+    The expected cost of a patch is its contribution to the coverage cost: the sum, over its cells, of the
+    probability that the cell is free times the distance from the robot's goal in meters. For example, 50
+    cells that are free with probability 0.8, at a mean distance of 3 m, have an expected cost of 120. It is
+    close to zero for the inside of an obstacle.
+    """
     # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
     unknown = map_window.unknown_area
-    costs = cell_distances[unknown.nodes] * unknown.expected_free_counts
-    label_count = 1 + unknown.patches.max(initial=0)
-    return np.asarray(np.bincount(unknown.patches, costs, minlength=label_count))
+    return _sum_by_patch(map_window, cell_distances[unknown.nodes] * unknown.expected_free_counts)
+
+
+def compute_possible_savings(
+    planner: GridPlanner, nearest_distances: FloatArray, min_saving: float
+) -> FloatArray:
+    """Compute how much a robot in each unknown patch could save if all cells of the patch were free.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+    nearest_distances : (m,) array, m
+        Distance from each node to the nearest robot.
+    min_saving : float
+        Smaller savings do not matter. The unit is that of the savings.
+
+    Returns
+    -------
+    (p,) array
+        Savings by label, in cells times meters; 0 if they are less than `min_saving`, and for patches that
+        no viewpoint borders on. The label 0 does not occur.
+
+    Notes
+    -----
+    The expected cost (`compute_patch_costs`) is small for space among walls, because it may be the inside of
+    an obstacle. It may also be a winding corridor with its mouth in sight. The possible saving is then large:
+    the decrease of the sum of the distances from all cells of the patch to the nearest robot when one more
+    robot is placed in the patch. Of all positions for that robot, only some are tried.
+    """
+    map_window = planner.map_window
+    unknown = map_window.unknown_area
+    # Nodes that no robot can reach do not count.
+    distances = np.where(np.isfinite(nearest_distances), nearest_distances, 0.0)
+    # A robot cannot save more than the whole cost of a patch, which takes little time to compute.
+    upper_bounds = _sum_by_patch(map_window, distances[unknown.nodes] * unknown.counts)
+    savings = np.zeros(len(upper_bounds))
+    for patch in np.unique(map_window.frontier.patches):
+        if upper_bounds[patch] > min_saving:
+            is_in_patch = unknown.patches == patch
+            saving = _compute_saving(
+                planner, distances, unknown.nodes[is_in_patch], unknown.counts[is_in_patch]
+            )
+            savings[patch] = saving if saving > min_saving else 0.0
+    return savings
+
+
+def _compute_saving(
+    planner: GridPlanner, distances: FloatArray, patch_nodes: IntArray, counts: FloatArray
+) -> float:
+    """Return how much a robot at the best of some nodes of a patch saves, in cells times meters.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+    distances : (m,) array, m
+        Distance from each node to the nearest of the present robots; 0 for nodes that none can reach.
+    patch_nodes : (p,) int array
+        Nodes of the patch.
+    counts : (p,) array
+        Number of cells of the patch that each of these nodes represents.
+    """
+    is_usable = planner.map_window.has_clearance[patch_nodes] & (distances[patch_nodes] > 0.0)
+    usable_nodes = patch_nodes[is_usable]
+    step = max(1, math.ceil(len(usable_nodes) / _MAX_TRIED_POSITIONS))
+    patch_distances = distances[patch_nodes]
+    max_distance = float(patch_distances.max())
+    table = planner.graph.compute_distance_table(usable_nodes[::step], max_distance)[:, patch_nodes]
+    decreases = np.maximum(patch_distances - table, 0.0) @ counts
+    return float(decreases.max(initial=0.0))
+
+
+def _sum_by_patch(map_window: MapWindow, values: FloatArray) -> FloatArray:
+    """Sum the values of the entries of `map_window.unknown_area` by the label of the patch."""
+    patches = map_window.unknown_area.patches
+    return np.bincount(patches, values, minlength=1 + patches.max(initial=0)).astype(np.float64)
 
 
 def _get_path_lengths(map_window: MapWindow, path_lengths: FloatArray, candidates: _Candidates) -> FloatArray:

@@ -16,7 +16,6 @@ from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.own_goal import find_own_goal
 from robocov.planning.raster import Raster
 from robocov.planning.team_placement import MinSavings, TeamSituation, compute_node_weights, place_team
-from robocov.planning.viewpoint import find_viewpoint
 from robocov.planning.window import Window
 
 NO_POSITIONS = np.empty((0, 2))
@@ -116,29 +115,6 @@ def test_goals_are_exchanged_only_if_that_saves_enough() -> None:
     for min_saving, is_exchanged in ((0.0, True), (0.5, True), (0.6, False)):
         new_goals = place_team(planner, weights, team, MinSavings(1.0, 1.0, swap=min_saving))
         assert np.array_equal(new_goals, goals[::-1] if is_exchanged else goals)
-
-
-def test_a_viewpoint_is_at_the_border_of_an_open_patch_and_away_from_previous_ones() -> None:
-    state = np.full(RASTER.shape, FREE, dtype=np.uint8)
-    state[10:20, 10:20] = WALL
-    state[11:19, 11:19] = 0
-    state[10:20, 50:60] = 0
-    planner = GridPlanner(DiscoveredMap(RASTER, state), WINDOW, 0.0)
-    ones = np.ones(len(planner.map_window.nodes))
-    first = find_viewpoint(planner.map_window, ones, ones, 5.0, ())
-    assert first is not None
-    assert 4.9 < first[0] < 6.1
-    assert 0.9 < first[1] < 2.1
-    second = find_viewpoint(planner.map_window, ones, ones, 5.0, (first,))
-    assert second is not None
-    assert math.dist(first, second) > 0.5
-    assert find_viewpoint(planner.map_window, ones, ones, 101.0, ()) is None
-
-
-def test_there_is_no_viewpoint_if_everything_is_known() -> None:
-    planner = build_planner(HALVES)
-    ones = np.ones(len(planner.map_window.nodes))
-    assert find_viewpoint(planner.map_window, ones, ones, 0.0, ()) is None
 
 
 def test_the_own_goal_minimizes_the_cost() -> None:

@@ -49,7 +49,7 @@ from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.node_visibility import NO_NODE
 from robocov.planning.own_goal import OwnGoal, find_own_goal
 from robocov.planning.team_placement import MinSavings, compute_node_weights
-from robocov.planning.viewpoint import find_viewpoint
+from robocov.planning.viewpoint import compute_patch_costs, compute_possible_savings, find_viewpoint
 from robocov.planning.window import Window
 from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
@@ -67,6 +67,11 @@ _LISTENING_S = 2.0
 """Time that robots wait at their starts if they know the positions of others only from messages."""
 _SHARED_PATIENCE_FACTOR = 2.5
 """Factor of the gain `patience` if all robots learn what one of them sees."""
+_MIN_POSSIBLE_SAVING = 0.15
+"""Fraction of the coverage cost that a robot in unknown space among walls must be able to save, if all of
+that space is free, before another robot looks into it."""
+_POSSIBLE_SAVING_DOUBLING_LENGTH = 1.0
+"""Path length to viewpoints that doubles this fraction, in diameters of the region."""
 _MIN_PROGRESS_M = 0.05
 """A robot that has not arrived at its goal and moves less than this between two plans is stuck."""
 _SWAP_SAVING = 0.1
@@ -143,8 +148,10 @@ class Atlas(BaseController):
     *Own goal and viewpoints.* A new goal must save the fraction `rest` of the cost of the robot's own cell. A
     robot moves to a viewpoint if the unknown space that it would see there is expected to contribute at least
     the fraction `stake` of the cost. This fraction doubles with the length of the paths to viewpoints
-    (`patience`). A robot that knows of no others does not look for viewpoints, because its goal hardly
-    depends on unknown space.
+    (`patience`). Unknown space among walls is expected to be the inside of an obstacle, but may also be a
+    winding corridor. A robot at rest also looks into it if a robot in there could save a large fraction of
+    the cost, should all of that space be free. A robot that knows of no others does not look for viewpoints,
+    because its goal hardly depends on unknown space.
 
     *Coming to rest.* The required savings double with the path length of a robot (`settling`), not with time,
     so that a team at rest still responds to changes. Path lengths start from zero when a robot joins or
@@ -462,7 +469,7 @@ class Atlas(BaseController):
         # After a change of the team or the walls, the path length starts from zero.
         added_length = max(state.path.length - previous.path.length, 0.0)
         path = _extend_viewpoint_path(state, position, added_length)
-        motion = self._choose_motion(state, path, own, position, is_agreed=cooperation.is_agreed)
+        motion = self._choose_motion(replace(state, path=path), cooperation, own, position)
         goal = motion.goal if motion.viewpoint is None else motion.viewpoint
         return replace(state, path=path, motion=motion), goal
 
@@ -472,26 +479,20 @@ class Atlas(BaseController):
         """Return a robot's own goal, near its goal in the team's plan; None if no node has clearance."""
         assert state.basis is not None and state.team_goals is not None
         planner = state.basis.planner
-        team_goals = state.team_goals.goals
-        first_node = planner.visibility.find_entry_node(team_goals[0])
+        first_node = planner.visibility.find_entry_node(state.team_goals.goals[0])
         if first_node == NO_NODE:
             return None
-        is_mobile = ~cooperation.is_fixed
-        # The robots without a goal in the plan come last. All of them are fixed.
-        is_mobile_in_plan = is_mobile[: len(team_goals) - 1]
-        other_positions = state.basis.positions[1:].copy()
-        other_positions[is_mobile] = team_goals[1:][is_mobile_in_plan]
         return find_own_goal(
             planner,
             compute_node_weights(planner.map_window, seen.density),
-            other_positions,
+            _predict_other_positions(state, cooperation),
             first_node,
             previous_goal=np.full(2, np.nan) if state.motion is None else state.motion.goal,
             min_saving=min(1.0, self.rest * cooperation.savings_factor),
         )
 
     def _choose_motion(
-        self, state: PlannerState, path: TraveledPath, own: OwnGoal, position: FloatArray, *, is_agreed: bool
+        self, state: PlannerState, cooperation: Cooperation, own: OwnGoal, position: FloatArray
     ) -> OwnMotion:
         """Return a robot's motion: straight to its own goal, or first to a viewpoint.
 
@@ -499,28 +500,77 @@ class Atlas(BaseController):
         on a path to a viewpoint.
         """
         assert state.basis is not None
-        planner = state.basis.planner
         is_heading_for_viewpoint = state.motion is not None and state.motion.viewpoint is not None
         is_away_from_goal = math.dist(own.goal, position) > _ARRIVAL_RADIUS_M
         if is_away_from_goal and not is_heading_for_viewpoint:
             return OwnMotion(own.goal)
         viewpoint = None
-        node = planner.visibility.find_entry_node(position)
+        node = state.basis.planner.visibility.find_entry_node(position)
         # The goal of a lone robot hardly depends on unknown space, so it needs no viewpoints.
         has_others = len(state.basis.robots) > 1
         if node != NO_NODE and self.stake < 1.0 and has_others:
-            # The longer the path to viewpoints already is, the more must be gained from another one.
-            patience = self.patience * (_SHARED_PATIENCE_FACTOR if is_agreed else 1.0)
-            doubling_length = patience * state.known_map.raster.region.diameter
-            doublings = min(path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
-            viewpoint = find_viewpoint(
-                planner.map_window,
-                own.cell_distances,
-                path_lengths=planner.graph.get_distances(node),
-                min_cost=self.stake * own.cost * 2.0**doublings,
-                previous_viewpoints=path.viewpoints,
-            )
+            viewpoint = self._find_viewpoint(state, cooperation, own, node)
         return OwnMotion(own.goal, viewpoint, is_idle=viewpoint is None)
+
+    def _find_viewpoint(
+        self, state: PlannerState, cooperation: Cooperation, own: OwnGoal, node: int
+    ) -> FloatArray | None:
+        """Return the viewpoint to which a robot at a node moves next, (2,) m; None if none is worth it."""
+        assert state.basis is not None
+        planner = state.basis.planner
+        # The longer the path to viewpoints already is, the more must be gained from another one.
+        patience = self.patience * (_SHARED_PATIENCE_FACTOR if cooperation.is_agreed else 1.0)
+        doubling_length = patience * state.known_map.raster.region.diameter
+        doublings = min(state.path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
+        costs = compute_patch_costs(planner.map_window, own.cell_distances)
+        costs[costs <= self.stake * own.cost * 2.0**doublings] = 0.0
+        path_lengths = planner.graph.get_distances(node)
+        viewpoint = find_viewpoint(planner.map_window, costs, path_lengths, state.path.viewpoints)
+        if viewpoint is not None:
+            return viewpoint
+        return self._find_viewpoint_among_walls(state, cooperation, own, node)
+
+    def _find_viewpoint_among_walls(
+        self, state: PlannerState, cooperation: Cooperation, own: OwnGoal, node: int
+    ) -> FloatArray | None:
+        """Return a viewpoint for a look into space that is unlikely to be free but would matter if it were.
+
+        Unknown space among walls is probably the inside of an obstacle, but it may also be a winding
+        corridor. A robot moves to a viewpoint there only if it knows of no other robot that is closer, and if
+        no other robot is moving, unless all robots plan on the same map.
+        """
+        assert state.basis is not None
+        is_heading_for_viewpoint = state.motion is not None and state.motion.viewpoint is not None
+        if not (cooperation.is_agreed or state.basis.is_quiet or is_heading_for_viewpoint):
+            return None
+        planner = state.basis.planner
+        other_positions = _predict_other_positions(state, cooperation)
+        doubling_length = _POSSIBLE_SAVING_DOUBLING_LENGTH * state.known_map.raster.region.diameter
+        doublings = min(state.path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
+        savings = compute_possible_savings(
+            planner,
+            planner.compute_distances_from(np.vstack([own.goal, other_positions])),
+            min_saving=_MIN_POSSIBLE_SAVING * own.cost * 2.0**doublings,
+        )
+        # Of the space between a robot and another one that it cannot reach through known space, it does not
+        # know whether there is a path.
+        is_connected = planner.map_window.find_connected(state.basis.positions)[1:]
+        other_distances = planner.compute_distances_from(other_positions[is_connected])
+        path_lengths = planner.graph.get_distances(node)
+        path_lengths = np.where(path_lengths < other_distances, path_lengths, np.inf)
+        return find_viewpoint(planner.map_window, savings, path_lengths, state.path.viewpoints)
+
+
+def _predict_other_positions(state: PlannerState, cooperation: Cooperation) -> FloatArray:
+    """Return the positions of the other robots in a robot's plan, (k, 2) m; their goals if they move."""
+    assert state.basis is not None and state.team_goals is not None
+    team_goals = state.team_goals.goals
+    is_mobile = ~cooperation.is_fixed
+    # The robots without a goal in the plan come last. All of them are fixed.
+    is_mobile_in_plan = is_mobile[: len(team_goals) - 1]
+    positions = state.basis.positions[1:].copy()
+    positions[is_mobile] = team_goals[1:][is_mobile_in_plan]
+    return positions
 
 
 def _may_skip_plan(

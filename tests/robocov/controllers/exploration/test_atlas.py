@@ -18,8 +18,11 @@ from robocov.controllers.exploration.atlas_memory import (
     OwnMotion,
     PlanBasis,
     PlannerState,
+    TeamGoals,
     TeamKnowledge,
+    TraveledPath,
 )
+from robocov.controllers.exploration.team_goals import Cooperation
 from robocov.controllers.exploration.team_knowledge import update_knowledge
 from robocov.controllers.exploration.teammates import Teammates
 from robocov.cost import CoverageCost
@@ -29,8 +32,11 @@ from robocov.mapfile import load_map
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations
 from robocov.observation.neighbors import Neighbors
+from robocov.optimum import find_optimum
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.own_goal import OwnGoal
+from robocov.planning.raster import Raster
 from robocov.planning.window import Window
 from robocov.record import Record
 from robocov.simulation import Simulation
@@ -47,6 +53,17 @@ ROOMS = Environment(
     ),
 )
 CORNER = [[0.8, 0.8], [1.3, 0.8], [0.8, 1.3], [1.3, 1.3]]
+SPIRAL = Environment(
+    "spiral",
+    ((0.0, 0.0), (7.0, 0.0), (7.0, 7.0), (0.0, 7.0)),
+    (
+        WallObstacle(
+            ((0.0, 1.2), (5.8, 1.2), (5.8, 5.8), (1.2, 5.8), (1.2, 2.4), (4.6, 2.4), (4.6, 4.6)), 0.12
+        ),
+    ),
+)
+"""A corridor that winds to the center. Its walls hide what is behind the next corner."""
+SPIRAL_STARTS = [[6.5, 0.3], [6.0, 0.3], [5.5, 0.3], [5.0, 0.3]]
 HALL = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
 
 ROBOT_RADIUS_M = 0.1
@@ -202,6 +219,87 @@ def test_a_single_robot_moves_to_the_center() -> None:
         simulation.step()
     assert np.isfinite(simulation.observe_and_decide().decision.forces).all()
     assert np.hypot(*(simulation.positions[0] - CORNER[0])) > 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "duration"), [(Atlas, 60.0), (AtlasShared, 40.0)])
+def test_robots_look_into_winding_corridors_before_they_settle(kind: type[Atlas], duration: float) -> None:
+    """The space behind the walls could be the inside of an obstacle, but most of the cost may be there."""
+    record = Simulation(SPIRAL, kind(), SPIRAL_STARTS, dt=0.05).run(duration)
+    cost = CoverageCost(SPIRAL, lattice=48, radius=ROBOT_RADIUS_M)
+    best = find_optimum(SPIRAL, 4, lattice=32, restarts=4)
+    assert cost(record.positions[-1]).mean_distance < 1.1 * best.mean_distance
+
+
+def find_viewpoint_at_chamber(
+    positions: list[list[float]],
+    *,
+    is_agreed: bool = False,
+    is_quiet: bool = True,
+    is_heading_for_viewpoint: bool = False,
+    viewpoint_length: float = 0.0,
+) -> np.ndarray | None:
+    """Find the viewpoint of the first robot for a look into an unknown chamber.
+
+    The chamber is on the right of a square of 8 m, and has a door of 1 m at x = 4, between y = 3.5 and 4.5. A
+    wall at y = 6.5 divides the square. A part of it is unknown, and the space above it is known.
+    """
+    raster = Raster(ROOMS.region, 0.1)
+    state = np.full(raster.shape, FREE, dtype=np.uint8)
+    state[5:60, 40:] = WALL
+    state[7:58, 42:78] = UNKNOWN
+    state[35:45, 40:42] = UNKNOWN
+    state[65, :] = WALL
+    state[65, 30:40] = UNKNOWN
+    known_map = DiscoveredMap(raster, state)
+    window = Window.build_around(raster, np.array([4.0, 4.0]), math.inf, 1000)
+    planner = GridPlanner(known_map, window, 0.15)
+    robot_positions = np.array(positions)
+    robots = np.arange(len(positions))
+    goal = robot_positions[0]
+    planner_state = PlannerState(
+        known_map=known_map,
+        next_plan_time=0.0,
+        knowledge=TeamKnowledge(Teammates.build_empty()),
+        path=TraveledPath(viewpoint_length=viewpoint_length),
+        basis=PlanBasis(known_map, planner, robots, robot_positions, is_quiet=is_quiet),
+        team_goals=TeamGoals(planner, robots, robot_positions),
+        motion=OwnMotion(goal, goal if is_heading_for_viewpoint else None),
+    )
+    cooperation = Cooperation(
+        is_agreed=is_agreed,
+        is_joint=False,
+        group_size=len(positions),
+        is_fixed=np.ones(len(positions) - 1, dtype=bool),
+        savings_factor=1.0,
+    )
+    node = planner.visibility.find_entry_node(goal)
+    own = OwnGoal(goal=goal, node=node, cell_distances=np.zeros(len(planner.map_window.nodes)), cost=1e4)
+    return Atlas()._find_viewpoint_among_walls(planner_state, cooperation, own, node)
+
+
+def test_a_robot_at_rest_looks_into_a_chamber_if_no_other_is_closer() -> None:
+    viewpoint = find_viewpoint_at_chamber([[2.0, 4.0], [1.0, 1.0]])
+    assert viewpoint is not None
+    assert 3.8 < viewpoint[0] < 4.1
+    assert 3.5 < viewpoint[1] < 4.5
+    assert find_viewpoint_at_chamber([[2.0, 4.0], [3.0, 4.0]]) is None
+    # Through unknown space, the other robot may be closer, but the robot does not know whether it can pass.
+    assert find_viewpoint_at_chamber([[0.5, 4.0], [3.5, 7.0]]) is not None
+
+
+def test_robots_with_their_own_maps_look_into_chambers_one_after_the_other() -> None:
+    positions = [[2.0, 4.0], [1.0, 1.0]]
+    assert find_viewpoint_at_chamber(positions, is_quiet=False) is None
+    assert find_viewpoint_at_chamber(positions, is_quiet=False, is_heading_for_viewpoint=True) is not None
+    assert find_viewpoint_at_chamber(positions, is_quiet=False, is_agreed=True) is not None
+
+
+def test_a_robot_that_has_looked_around_a_lot_leaves_chambers_alone() -> None:
+    positions = [[2.0, 4.0], [1.0, 1.0]]
+    diameter = ROOMS.region.diameter
+    assert find_viewpoint_at_chamber(positions, viewpoint_length=0.1 * diameter) is not None
+    assert find_viewpoint_at_chamber(positions, viewpoint_length=4.0 * diameter) is None
 
 
 @pytest.mark.slow
