@@ -1,11 +1,12 @@
 """Measure the goals of the controller `atlas` that the benchmark's tracks do not cover.
 
-    python tests/bench/bench_atlas.py doors large-maps hard-maps sizes --controller atlas-shared
+    python tests/bench/bench_atlas.py doors large-maps hard-maps corridors sizes --controller atlas-shared
     python tests/bench/bench_atlas.py ranges stakes rest pace --controller atlas-shared
 
 - ``doors``: whether robots find narrow doors in walls of random direction
 - ``large-maps``: the same in upright walls on larger maps, where nodes of planners are farther apart
 - ``hard-maps``: costs and rest in tunnels, behind narrow doors, next to a notch, and of three robots in rooms
+- ``corridors``: gaps in spiral corridors and between nested walls, with and without limited communication
 - ``sizes``: whether a larger team is ever worse than a smaller one
 - ``ranges``: gaps, rest and path lengths with limited ranges, next to `rapf`
 - ``stakes``: costs and path lengths for different values of the gain `stake`, on maps outside the benchmark
@@ -16,9 +17,10 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -77,6 +79,31 @@ HARD_MAP_LATTICE = 64
 REFERENCE_RESTARTS = 12
 """Number of restarts of the search for the best placement on each of the hard maps."""
 RIVAL_CONTROLLER = "greedy-submodular"
+
+SQUARE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+"""Corners of a square with sides of length 2, counterclockwise from the lower left one."""
+CORRIDOR_WALL_WIDTH_M = 0.12
+SPIRAL_CASES = (
+    (11.0, 1.5, 1),
+    (9.0, 1.3, 2),
+    (11.0, 1.5, 2),
+    (13.0, 1.7, 2),
+    (13.0, 1.45, 4),
+)
+"""Arguments of `build_square_spiral`."""
+MIN_SPIRAL_HALF_SIDE_M = 0.9
+"""Half the side of the square in the middle of a spiral in which there are no walls."""
+NESTED_CASES = (
+    (11.0, 1.4, ((1, 0.0), (3, 0.0), (1, 0.0))),
+    (12.0, 1.5, ((0, 3.0), (2, -2.0), (0, 1.0))),
+    (13.0, 1.6, ((2, 4.0), (0, -3.0), (1, 1.0))),
+    (14.0, 1.4, ((2, 4.0), (3, -3.0), (2, 1.0), (0, 0.0))),
+)
+"""Arguments of `build_nested_squares`."""
+NESTED_OPENING_M = 1.0
+CORRIDOR_START_RADIUS_M = 0.65
+CORRIDOR_TEAM_SIZE = 6
+CORRIDOR_DURATION_S = 120.0
 
 TEAM_SIZES = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200)
 MAX_CORNER_TEAM = 50
@@ -331,6 +358,65 @@ def build_house_with_notch() -> Environment:
     return Environment("house with a notch", boundary, walls, starts)
 
 
+def build_square_spiral(side: float, spacing: float, arms: int) -> Environment:
+    """Build a square hall in which spiral walls leave one or more corridors to the center.
+
+    Parameters
+    ----------
+    side : float, m
+        Side of the hall.
+    spacing : float, m
+        Distance between neighboring walls.
+    arms : int
+        Number of walls, each of which begins at another corner: 1, 2 or 4.
+    """
+    walls = []
+    for arm in range(arms):
+        points = []
+        for turn in itertools.count():
+            half_side = side / 2.0 - arms * spacing * turn / 4.0
+            if half_side < MIN_SPIRAL_HALF_SIDE_M:
+                break
+            x, y = SQUARE_CORNERS[(turn + 4 * arm // arms) % 4]
+            points.append((side / 2.0 + x * half_side, side / 2.0 + y * half_side))
+        walls.append(WallObstacle(tuple(points), CORRIDOR_WALL_WIDTH_M))
+    return build_corridors(f"spiral of {side:g} m with {arms} arms", side, walls)
+
+
+def build_nested_squares(side: float, spacing: float, openings: Sequence[tuple[int, float]]) -> Environment:
+    """Build nested square walls in a square hall, each with one opening.
+
+    Parameters
+    ----------
+    side : float, m
+        Side of the hall.
+    spacing : float, m
+        Distance between neighboring walls.
+    openings : sequence of (int, float)
+        For each wall from the outermost one: the side of the square, from 0 for the lower one
+        counterclockwise, and the distance of the opening from the middle of that side, m.
+    """
+    walls = []
+    for ring, (opening_side, offset) in enumerate(openings):
+        half_side = side / 2.0 - (1 + ring) * spacing
+        corners = half_side * np.roll(np.array(SQUARE_CORNERS), -opening_side, axis=0)
+        direction = (corners[1] - corners[0]) / (2.0 * half_side)
+        middle = 0.5 * (corners[0] + corners[1]) + offset * direction
+        half_opening = 0.5 * NESTED_OPENING_M * direction
+        points = side / 2.0 + np.array(
+            [middle + half_opening, *corners[1:], corners[0], middle - half_opening]
+        )
+        walls.append(WallObstacle(tuple((x, y) for x, y in points.tolist()), CORRIDOR_WALL_WIDTH_M))
+    return build_corridors(f"{len(openings)} nested squares of {side:g} m", side, walls)
+
+
+def build_corridors(name: str, side: float, walls: Sequence[WallObstacle]) -> Environment:
+    """Build a square hall with walls, in which a team starts in a corner."""
+    starts = {"corner": DiscStart((1.1, 1.0), CORRIDOR_START_RADIUS_M)}
+    boundary = ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side))
+    return Environment(name, boundary, tuple(walls), starts)
+
+
 def build_straight_wall(position: float, start: float, end: float, *, is_upright: bool) -> WallObstacle:
     """Build a wall from `start` to `end`, m, at x = `position` if it is upright, else at y = `position`."""
     if is_upright:
@@ -390,6 +476,54 @@ def measure_hard_case(controller: str, case: HardCase) -> str:
 def measure_hard_maps(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """Yield costs, rest and path length of each case."""
     yield from pool.map(partial(measure_hard_case, controller), HARD_CASES)
+
+
+def run_in_corridors(controller: str, environment: Environment, communication_range: float) -> LimitedRun:
+    """Run a team in spiral corridors or between nested walls."""
+    starts = environment.start(None).sample(CORRIDOR_TEAM_SIZE, seed=0, radius=ROBOT_RADIUS_M)
+    team = Team.homogeneous(CORRIDOR_TEAM_SIZE, communication_range=communication_range)
+    record = Simulation(environment, make_controller(controller), starts, team).run(CORRIDOR_DURATION_S)
+    optimum = find_optimum(
+        environment,
+        CORRIDOR_TEAM_SIZE,
+        radius=ROBOT_RADIUS_M,
+        lattice=HARD_MAP_LATTICE,
+        restarts=REFERENCE_RESTARTS,
+    )
+    cost = CoverageCost(environment, HARD_MAP_LATTICE, radius=ROBOT_RADIUS_M)
+    settling_time = find_settling_time(record.time, record.positions)
+    return LimitedRun(
+        gap=cost(record.positions[-1]).mean_distance / optimum.mean_distance - 1.0,
+        settling_time=math.nan if settling_time is None else settling_time,
+        mean_path_length=float(compute_path_lengths(record.positions).mean()),
+    )
+
+
+def measure_corridors(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield gaps, rest and path lengths in each map, and the median for each kind of map."""
+    kinds = {
+        "spirals": [build_square_spiral(*case) for case in SPIRAL_CASES],
+        "nested squares": [build_nested_squares(*case) for case in NESTED_CASES],
+    }
+    for communication_range in (math.inf, SHORT_RANGE_M):
+        for kind, environments in kinds.items():
+            run = partial(run_in_corridors, controller, communication_range=communication_range)
+            runs = list(pool.map(run, environments))
+            conditions = f"communication range {communication_range:g} m"
+            for environment, result in zip(environments, runs, strict=True):
+                rest = "not settled"
+                if not math.isnan(result.settling_time):
+                    rest = f"settled after {result.settling_time:.0f} s"
+                yield (
+                    f"{environment.name}, {conditions}: gap {result.gap:.1%}; {rest}; "
+                    f"path length {result.mean_path_length:.1f} m"
+                )
+            settled = sum(not math.isnan(result.settling_time) for result in runs)
+            yield (
+                f"{kind}, {conditions}: median gap {np.median([result.gap for result in runs]):.1%}, "
+                f"{settled} of {len(runs)} settled, "
+                f"median path length {np.median([result.mean_path_length for result in runs]):.1f} m"
+            )
 
 
 def run_in_rooms(controller: str, seed: int, communication_range: float, robots: int) -> FinalState:
@@ -549,6 +683,7 @@ MEASURES: Mapping[str, Measure] = {
     "doors": measure_doors,
     "large-maps": measure_large_maps,
     "hard-maps": measure_hard_maps,
+    "corridors": measure_corridors,
     "sizes": measure_sizes,
     "ranges": measure_ranges,
     "stakes": measure_stakes,
