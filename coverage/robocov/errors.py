@@ -500,8 +500,10 @@ def to_floats(
         raise error_type(_describe_mismatch(name, values, expected)) from None
 
 
-def require_seed(name: str, value: object, error_type: type[InputError] = ParameterError) -> None:
-    """Raise an error unless a value is a seed of random numbers.
+def require_whole_number(
+    name: str, value: object, minimum: int, error_type: type[InputError] = ParameterError
+) -> None:
+    """Raise an error unless a value is a whole number that is large enough.
 
     Parameters
     ----------
@@ -509,16 +511,24 @@ def require_seed(name: str, value: object, error_type: type[InputError] = Parame
         Name of the parameter in the message.
     value : object
         The value to check.
+    minimum : int
+        The smallest number that is accepted.
     error_type : type
         Class of the error to raise.
 
     Raises
     ------
     InputError
-        Of type `error_type`, if the value is not a whole number of at least 0.
+        Of type `error_type`, if the value is not a whole number of at least `minimum`.
+
+    Examples
+    --------
+    >>> require_whole_number("robots", 0, 1)
+    Traceback (most recent call last):
+    robocov.errors.ParameterError: robots: expected a whole number of at least 1, got 0
     """
-    if not is_number(value, Integral) or value < 0:
-        raise error_type(f"{name}: expected a whole number of at least 0, got {quote(value)}")
+    if not is_number(value, Integral) or value < minimum:
+        raise error_type(f"{name}: expected a whole number of at least {minimum}, got {quote(value)}")
 
 
 def require_type(name: str, value: object, kind: type, expected: str) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Integral
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +34,7 @@ from robocov.errors import (
     quote,
     quote_json,
     require_number,
+    require_whole_number,
     to_floats,
 )
 from robocov.typing import BoolArray, FloatArray, IntArray
@@ -252,8 +252,7 @@ class Team:
         ParameterError
             If a value is not a number, or out of range.
         """
-        if not is_number(n, Integral) or n < 1:
-            raise ParameterError(f"robots: expected a whole number of at least 1, got {quote(n)}")
+        require_whole_number("robots", n, 1)
         values: dict[str, float] = {
             "radius": radius,
             "mass": mass,

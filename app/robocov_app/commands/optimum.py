@@ -14,7 +14,7 @@ import tyro
 
 from robocov.defaults import DEFAULT_RADIUS_M, DEFAULT_ROBOTS
 from robocov.environment import Environment
-from robocov.errors import InputError, format_count, require_number, require_seed
+from robocov.errors import InputError, format_count, require_number, require_whole_number
 from robocov.files.writing import replace_file
 from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
@@ -77,7 +77,7 @@ class Arguments(FigureOptions):
         require_number("--restarts", self.restarts, 1, MAX_RESTARTS, whole=True)
         require_number("--lattice", self.lattice, MIN_LATTICE, MAX_LATTICE, whole=True)
         require_number("--precision", self.precision, MIN_PRECISION, 1.0)
-        require_seed("--seed", self.seed)
+        require_whole_number("--seed", self.seed, 0)
         if self.positions is not None:
             check_output_file(self.positions, "another --positions", overwrite=self.overwrite)
         super().__post_init__()

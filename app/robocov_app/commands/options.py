@@ -23,7 +23,7 @@ from robocov.defaults import (
     DEFAULT_VISCOSITY_N_S_M,
 )
 from robocov.errors import MAX_SEED, ParameterError, require_number
-from robocov.files.result_folder import describe_path
+from robocov.files.paths import describe_path
 from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.arguments import parse_size, parse_window_size
 

@@ -6,7 +6,6 @@ Importing this module registers the environment. ``gymnasium.make`` does both if
 """
 
 from functools import partial
-from numbers import Integral
 from typing import Any, cast
 
 import gymnasium
@@ -14,7 +13,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from robocov.errors import ParameterError, is_number, quote
+from robocov.errors import ParameterError, quote, require_whole_number
 from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import check_actions, compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
@@ -210,8 +209,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         render_mode: str | None = None,
         **changes: Any,
     ) -> None:
-        if not is_number(num_envs, Integral) or num_envs < 1:
-            raise ParameterError(f"num_envs: expected a whole number of at least 1, got {quote(num_envs)}")
+        require_whole_number("num_envs", num_envs, 1)
         self.task = change_task(task, changes)
         radius = self.task.whole_team.min_radius
         sampler = MapSampler(self.task.maps, self.task.lattice, radius)

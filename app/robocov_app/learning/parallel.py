@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import compress
-from numbers import Integral
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -10,7 +9,7 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.errors import ParameterError, is_number, quote, to_floats
+from robocov.errors import ParameterError, quote, require_whole_number, to_floats
 from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
@@ -78,9 +77,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         super().__init__(task, **options)
         self.max_cycles = self.task.cycles
         if max_cycles is not None:
-            if not is_number(max_cycles, Integral) or max_cycles < 1:
-                actual = quote(max_cycles)
-                raise ParameterError(f"max_cycles: expected a whole number of at least 1, got {actual}")
+            require_whole_number("max_cycles", max_cycles, 1)
             self.max_cycles = min(max_cycles, self.task.cycles)
         self.possible_agents = self.task.agents
         self.agents: list[str] = []

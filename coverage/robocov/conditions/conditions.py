@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
 from robocov.conditions.random_streams import FAILURE_STREAM, create_generator
-from robocov.errors import ParameterError, quote, require_number, require_seed
+from robocov.errors import ParameterError, quote, require_number, require_whole_number
 from robocov.typing import BoolArray, FloatArray
 
 TIME_TOLERANCE_S = 1e-9
@@ -142,7 +142,7 @@ class Conditions:
             object.__setattr__(self, name, number)
         object.__setattr__(self, "failures", build_events("failures", Failure, self.failures))
         object.__setattr__(self, "joins", build_events("joins", Join, self.joins))
-        require_seed("conditions.seed", self.seed)
+        require_whole_number("conditions.seed", self.seed, 0)
         if self.density not in get_args(DensityKnowledge):
             raise ParameterError(f"conditions.density: expected known or sensed, got {quote(self.density)}")
         self._check_forget_after()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Integral
 from typing import TypeAlias
 
 import numpy as np
@@ -21,7 +20,7 @@ from robocov.environment.packing import (
     pack_lattice,
     pack_randomly,
 )
-from robocov.errors import StartError, format_count, format_position, is_number, quote, require_seed
+from robocov.errors import StartError, format_count, format_position, require_whole_number
 from robocov.team import PARAMETERS as TEAM_PARAMETERS
 from robocov.typing import FloatArray, Point
 
@@ -174,9 +173,8 @@ class Start:
         >>> Start("corner", DiscStart((1.0, 1.0), 0.8), square).sample(6, seed=3).shape
         (6, 2)
         """
-        if not is_number(n, Integral) or n < 1:
-            raise self._build_error(f"robots: expected a whole number of at least 1, got {quote(n)}")
-        require_seed(f"start {self.name!r}: seed", seed, StartError)
+        require_whole_number(f"start {self.name!r}: robots", n, 1, StartError)
+        require_whole_number(f"start {self.name!r}: seed", seed, 0, StartError)
         self._require_radius(radius)
         if isinstance(self.spec, PointsStart):
             return self._take_given_positions(n, radius, self.spec.positions)

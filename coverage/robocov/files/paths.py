@@ -21,3 +21,20 @@ def is_existing_file(path: Path) -> bool:
         an error in these cases.
     """
     return os.path.isfile(path)  # noqa: PTH113
+
+
+def describe_path(path: Path) -> str:
+    """Describe the kind of a path, for an error message.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+        "a folder", "a file" or "a path that does not exist".
+    """
+    if path.is_dir():
+        return "a folder"
+    return "a file" if path.exists() else "a path that does not exist"

@@ -22,6 +22,7 @@ from typing import Any, Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, describe_error, quote
 from robocov.files.folder_lock import lock_folder
+from robocov.files.paths import describe_path
 from robocov.files.result_names import (
     BRANCH_FILE,
     COMPARISON_FILE,
@@ -374,23 +375,6 @@ def require_result(folder: Path, expected: str, files: Sequence[str]) -> None:
         listing = f"{', '.join(first_files)} or {last_file}" if first_files else last_file
         actual = f"a folder without {listing}"
     raise InputError(f"{folder}: expected {expected}, got {actual}")
-
-
-def describe_path(path: Path) -> str:
-    """Describe the kind of a path, for an error message.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    str
-        "a folder", "a file" or "a path that does not exist".
-    """
-    if path.is_dir():
-        return "a folder"
-    return "a file" if path.exists() else "a path that does not exist"
 
 
 def _read_manifest(path: Path) -> tuple[set[str], set[str]] | None:

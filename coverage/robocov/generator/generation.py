@@ -26,7 +26,7 @@ from robocov.errors import (
     ParameterError,
     describe_unknown_name,
     require_number,
-    require_seed,
+    require_whole_number,
 )
 from robocov.generator.blocks import build_town
 from robocov.generator.caves import build_cave
@@ -196,7 +196,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     >>> rc.generate_map(3, kind="polygons", obstacles=4)
     <Environment polygons 3, 10 x 10 m, 4 obstacles>
     """
-    require_seed("seed", seed)
+    require_whole_number("seed", seed, 0)
     if not isinstance(kind, str) or kind not in GENERATORS:
         raise ParameterError(describe_unknown_name("kind of map", str(kind), GENERATORS))
     map_kind = GENERATORS[kind]

@@ -22,7 +22,7 @@ from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.environment.packing import pack_densely
-from robocov.errors import ParameterError, require_number, require_seed
+from robocov.errors import ParameterError, require_number, require_whole_number
 from robocov.k_median import apply_best_swaps, run_lloyd, seed_sources
 from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
@@ -254,7 +254,7 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
     """Raise ParameterError if a parameter of `find_optimum` is out of range."""
     require_number("robots", robots, 1, MAX_ROBOTS, whole=True)
     require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
-    require_seed("seed", seed)
+    require_whole_number("seed", seed, 0)
     TEAM_PARAMETERS["radius"].require("radius", radius)
 
 

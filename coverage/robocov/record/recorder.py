@@ -12,7 +12,7 @@ from robocov.controllers import Controller, get_gain_values, get_recorded_name
 from robocov.controllers.gains import Value
 from robocov.controllers.individual import unwrap_controller
 from robocov.environment import Environment
-from robocov.errors import ParameterError, quote, require_seed, require_type, to_one_line
+from robocov.errors import ParameterError, quote, require_type, require_whole_number, to_one_line
 from robocov.observation import Snapshot
 from robocov.record.record import Record
 from robocov.record.record_arrays import STEERING, list_array_names
@@ -74,7 +74,7 @@ class Recorder:
         if self.start is not None:
             require_type("start", self.start, str, "the name of a start, or None")
         if self.seed is not None:
-            require_seed("seed", self.seed)
+            require_whole_number("seed", self.seed, 0)
         if self.name is None:
             self.name = get_recorded_name(self.controller)
         self._gains = get_gain_values(unwrap_controller(self.controller))

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -36,10 +35,10 @@ from robocov.errors import (
     describe_unknown_name,
     find_similar_names,
     format_count,
-    is_number,
     quote,
     require_number,
     require_type,
+    require_whole_number,
 )
 from robocov.files.documents import check_header, validate_document
 from robocov.files.paths import is_existing_file
@@ -405,8 +404,7 @@ class Scenario:
         RobocovError
             If the run cannot start, or the controller fails.
         """
-        if not is_number(every, Integral) or every < 1:
-            raise ParameterError(f"every: expected a whole number of at least 1, got {quote(every)}")
+        require_whole_number("every", every, 1)
         if simulation is not None and not isinstance(simulation, Simulation):
             expected = "expected a Simulation (the duration is an attribute of the scenario)"
             raise ParameterError(f"simulation: {expected}, got {quote(simulation)}")

@@ -15,7 +15,14 @@ from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
 from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment, require_environment
-from robocov.errors import ParameterError, StartError, format_count, require_number, require_seed, to_floats
+from robocov.errors import (
+    ParameterError,
+    StartError,
+    format_count,
+    require_number,
+    require_whole_number,
+    to_floats,
+)
 from robocov.observation import Decision, Message, Observations, Scans, Snapshot, check_forces
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
@@ -413,7 +420,7 @@ class SimulationBatch:
             if len(seeds) != len(self):
                 raise ParameterError(f"seeds: expected {len(self)}, one for each run, got {len(seeds)}")
             for run, seed in enumerate(seeds):
-                require_seed(f"seeds[{run}]", seed)
+                require_whole_number(f"seeds[{run}]", seed, 0)
         steps = count_steps(duration, self.dt)
         recorder = Recorder(self.environment, self._joint_team, self.controller, self.dt, start=start)
         recorder.add(self._to_snapshot())

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from robocov.errors import ParameterError, StartError, is_number, quote, to_floats
+from robocov.errors import StartError, quote, require_whole_number, to_floats
 from robocov.typing import FloatArray
 from robocov.world.free_positions import require_finite_starts
 
@@ -77,8 +76,7 @@ class TeamState:
             steering = to_floats("steering", self.steering, f"{columns} of each robot", StartError)
             _check_rows("steering", steering, positions.shape, columns)
             object.__setattr__(self, "steering", steering)
-        if not is_number(self.steps, Integral) or self.steps < 0:
-            raise ParameterError(f"steps: expected a whole number of at least 0, got {quote(self.steps)}")
+        require_whole_number("steps", self.steps, 0)
 
     def __len__(self) -> int:
         """Return the number of robots."""

@@ -82,7 +82,7 @@ def reduced_study():
 
 
 def save_selected_image(figure, path):
-    """Save light PNG images and `SAVED_FIGURES`; tests/bench/quick_paper.py saves all figures."""
+    """Save light PNG images and `SAVED_FIGURES`; `test_quick_study` saves all figures."""
     if (path.suffix == ".png" and not path.stem.endswith("-dark")) or path.name in SAVED_FIGURES:
         save_figure(figure, path)
     else:

@@ -46,11 +46,12 @@ def compute_spread(peak: Gaussian) -> float:
 
 def add_peak(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
     """Add a hot spot with a center and standard deviation, m; a map without density gets a floor of 1."""
-    # A uniform image is replaced by a floor of the same weight, but areas would be lost.
     density = sketch.density
-    is_varying_image = isinstance(density, Raster) and not density.is_uniform
-    if isinstance(density, WeightedPolygons) or is_varying_image:
-        raise _build_kind_error(density, "hot spots cannot be added to")
+    if isinstance(density, WeightedPolygons | Raster):
+        # A uniform image is replaced by a floor of the same weight, but areas would be lost.
+        is_replaced = isinstance(density, Raster) and density.is_uniform
+        if not is_replaced:
+            raise _build_kind_error(density, "hot spots cannot be added to")
     peak = Gaussian(round_map_point(center), _round_weight(weight, MIN_PEAK_WEIGHT), _round_sigma(sigma))
     return _set_features(sketch, (*list_features(sketch), peak), "hot spot added")
 

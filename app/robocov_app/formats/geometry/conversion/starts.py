@@ -198,8 +198,8 @@ def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> Float
 def _describe_robots_of_file(fitting_count: int, count: int) -> str:
     """Return a note on the start "robots", with the number of positions at which robots fit."""
     if fitting_count == 0:
-        places = "the position of the robot" if count == 1 else f"any of the {count} positions of robots"
-        return f'no start "robots": no robot fits at {places} in the file'
+        positions = "the position of the robot" if count == 1 else f"any of the {count} positions of robots"
+        return f'no start "robots": no robot fits at {positions} in the file'
     note = f'start "robots": {fitting_count} of {format_count(count, "position")} of robots in the file'
     if count > MAX_FILE_ROBOTS:
         return f"{note}; only the first {MAX_FILE_ROBOTS} are read"

@@ -1,10 +1,7 @@
-"""Check which claims of the paper the quick study confirms.
+"""The quick study of the paper confirms the clear claims.
 
-    python -m pytest -n 0 tests/bench/quick_paper.py
-
-This takes minutes and is therefore no part of the test suite. Close claims require the maps of the full
-study. Runs are shorter and the grid of gains is smaller than in the quick study, and the studies beyond the
-paper are left out: tests/robocov_app/replication/test_whole_study.py covers them with a tiny plan.
+Close claims require the maps of the full study. Runs are shorter and the grid of gains is smaller than in the
+quick study, and the studies beyond the paper are left out: `test_whole_study` covers them with a tiny plan.
 """
 
 from __future__ import annotations
@@ -19,6 +16,8 @@ from robocov_app.cli import main
 from robocov_app.replication.claims.claim import GOALS
 from robocov_app.replication.claims.registration import load_registration
 from robocov_app.replication.design import plan
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]
 
 MAP_COUNT = 12
 """Number of maps, convex or not, behind each claim of the quick study."""
