@@ -34,13 +34,12 @@ from robocov.errors import (
     quote,
     quote_json,
     require_number,
-    require_whole_number,
     to_floats,
 )
 from robocov.typing import BoolArray, FloatArray, IntArray
 
 MAX_ROBOTS = 10_000
-"""Maximum number of robots in a team file or a record."""
+"""Maximum number of robots in a team file or a record, and of those that `Team.homogeneous` builds."""
 DEFAULT_TRACK_PER_RADIUS = 1.6
 """Default track width of a unicycle divided by its radius; the wheels are within the disc."""
 POINT = "point"
@@ -252,7 +251,7 @@ class Team:
         ParameterError
             If a value is not a number, or out of range.
         """
-        require_whole_number("robots", n, 1)
+        require_number("robots", n, 1, MAX_ROBOTS, whole=True)
         values: dict[str, float] = {
             "radius": radius,
             "mass": mass,

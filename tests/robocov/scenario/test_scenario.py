@@ -161,7 +161,7 @@ def test_check_accepts_what_can_run() -> None:
         ({"controller": rc.Rapf(), "gains": {"k_rep": 1.0}}, r"gains: expected none"),
         ({"source": "class Mine: ..."}, r"source: expected a ControllerSource"),
         ({"controller": rc.Rapf}, r"controller: expected a controller"),
-        ({"robots": 0}, r"robots: expected a whole number of at least 1"),
+        ({"robots": 0}, r"robots: expected a whole number from 1"),
         ({"robots": 3, "team": Team.homogeneous(2)}, r"robots: expected 2 as in the team, got 3"),
         ({"team": 3}, r"team: expected a Team"),
         ({"starts": [[1, 1]], "robots": 2}, r"starts: expected one for each of 2 robots, got 1"),

@@ -73,7 +73,7 @@ def test_limits_out_of_range_are_rejected(limits: dict[str, float], message: str
 
 
 def test_teams_without_robots_or_with_missing_values_are_rejected() -> None:
-    with pytest.raises(ParameterError, match="robots: expected a whole number of at least 1, got 0"):
+    with pytest.raises(ParameterError, match="robots: expected a whole number from 1 to 10000, got 0"):
         Team.homogeneous(0)
     ones = np.ones(2)
     with pytest.raises(

@@ -71,7 +71,7 @@ def test_closed_lines_with_its_name_are_the_boundary() -> None:
     foreign = build_map(collect_shapes(build_square(2, 2, 1, 1), lines=[*sides, [[5, 0], [5, 5]]]))
     assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(200 - 1 - 0.5)
-    assert foreign.notes[-1] == "1 line treated as walls, 0.1 m wide (--thickness)"
+    assert foreign.notes[-1] == "1 line treated as a wall, 0.1 m wide (--thickness)"
     with pytest.raises(MapError, match=r"plan: boundary 'open': encloses no area, expected a closed outline"):
         build_map(collect_shapes(HALL, lines=[([[0, 0], [1, 1]], "open")], boundary="open"))
 

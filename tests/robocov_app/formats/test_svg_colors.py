@@ -165,7 +165,7 @@ def test_the_width_of_a_stretched_stroke_is_that_across_it(
 ) -> None:
     path = f'<path d="{d}" fill="none" stroke="#000" stroke-width="0.2" transform="{transform}"/>'
     notes = read_shapes(tmp_path, '<rect id="boundary" x="-20" y="-20" width="50" height="50"/>' + path).notes
-    assert f"1 line treated as walls, {width} m wide (--thickness)" in notes
+    assert f"1 line treated as a wall, {width} m wide (--thickness)" in notes
 
 
 @pytest.mark.parametrize(

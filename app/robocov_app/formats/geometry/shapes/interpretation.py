@@ -288,11 +288,14 @@ def _describe(
         count = format_count(len(drawing.outlines), "closed outline")
         report.notes.append(f"{count} treated as free space (--outlines solid: as obstacles)")
     if obstacles.walls:
-        count = format_count(len(obstacles.walls), "line")
+        lines = format_count(len(obstacles.walls), "line")
+        walls = "a wall" if len(obstacles.walls) == 1 else "walls"
         widths = _format_widths(obstacles.walls)
-        report.notes.append(f"{count} treated as walls, {widths} m wide (--thickness)")
+        report.notes.append(f"{lines} treated as {walls}, {widths} m wide (--thickness)")
     if obstacles.pillars:
-        report.notes.append(f"{format_count(len(obstacles.pillars), 'point')} treated as pillars")
+        points = format_count(len(obstacles.pillars), "point")
+        pillars = "a pillar" if len(obstacles.pillars) == 1 else "pillars"
+        report.notes.append(f"{points} treated as {pillars}")
 
 
 def _format_widths(walls: Sequence[WallLine]) -> str:
