@@ -42,6 +42,7 @@ from robocov import (
     make_controller,
 )
 from robocov.environment import WallObstacle
+from robocov.errors import format_count
 from robocov.metrics import compute_path_lengths, find_settling_time
 from robocov.typing import FloatArray
 from robocov_app.benchmark import suite
@@ -90,17 +91,19 @@ SPIRAL_CASES = (
     (13.0, 1.7, 2),
     (13.0, 1.45, 4),
 )
-"""Arguments of `build_square_spiral`."""
+"""Side of the hall (m), distance between walls (m) and number of arms; see `build_square_spiral`."""
 MIN_SPIRAL_HALF_SIDE_M = 0.9
-"""Half the side of the square in the middle of a spiral in which there are no walls."""
+"""Minimum of half the side of the square without walls in the middle of a spiral."""
 NESTED_CASES = (
     (11.0, 1.4, ((1, 0.0), (3, 0.0), (1, 0.0))),
-    (12.0, 1.5, ((0, 3.0), (2, -2.0), (0, 1.0))),
-    (13.0, 1.6, ((2, 4.0), (0, -3.0), (1, 1.0))),
+    (12.0, 1.5, ((0, 3.0), (2, -2.0), (0, 0.75))),
+    (13.0, 1.6, ((2, 4.0), (0, -2.5), (1, 1.0))),
     (14.0, 1.4, ((2, 4.0), (3, -3.0), (2, 1.0), (0, 0.0))),
 )
-"""Arguments of `build_nested_squares`."""
+"""Side of the hall (m), distance between walls (m) and openings; see `build_nested_squares`."""
 NESTED_OPENING_M = 1.0
+CORRIDOR_START_CENTER = (1.1, 1.0)
+"""Center of the disc in a corner in which a team starts, m."""
 CORRIDOR_START_RADIUS_M = 0.65
 CORRIDOR_TEAM_SIZE = 6
 CORRIDOR_DURATION_S = 120.0
@@ -144,7 +147,7 @@ class FinalState(NamedTuple):
 
 
 class LimitedRun(NamedTuple):
-    """Result of a run with limited ranges."""
+    """Result of a run."""
 
     gap: float
     settling_time: float
@@ -368,19 +371,19 @@ def build_square_spiral(side: float, spacing: float, arms: int) -> Environment:
     spacing : float, m
         Distance between neighboring walls.
     arms : int
-        Number of walls, each of which begins at another corner: 1, 2 or 4.
+        Number of walls, each starting in a different corner of the hall: 1, 2 or 4.
     """
     walls = []
     for arm in range(arms):
         points = []
-        for turn in itertools.count():
-            half_side = side / 2.0 - arms * spacing * turn / 4.0
+        for corner in itertools.count():
+            half_side = side / 2.0 - arms * spacing * corner / 4.0
             if half_side < MIN_SPIRAL_HALF_SIDE_M:
                 break
-            x, y = SQUARE_CORNERS[(turn + 4 * arm // arms) % 4]
+            x, y = SQUARE_CORNERS[(corner + 4 * arm // arms) % 4]
             points.append((side / 2.0 + x * half_side, side / 2.0 + y * half_side))
         walls.append(WallObstacle(tuple(points), CORRIDOR_WALL_WIDTH_M))
-    return build_corridors(f"spiral of {side:g} m with {arms} arms", side, walls)
+    return build_corridors(f"spiral of {side:g} m, {format_count(arms, 'arm')}", side, walls)
 
 
 def build_nested_squares(side: float, spacing: float, openings: Sequence[tuple[int, float]]) -> Environment:
@@ -394,11 +397,19 @@ def build_nested_squares(side: float, spacing: float, openings: Sequence[tuple[i
         Distance between neighboring walls.
     openings : sequence of (int, float)
         For each wall from the outermost one: the side of the square, from 0 for the lower one
-        counterclockwise, and the distance of the opening from the middle of that side, m.
+        counterclockwise, and the offset of the opening from the middle of that side in counterclockwise
+        direction, m.
+
+    Raises
+    ------
+    ValueError
+        If an opening is not between the ends of its side.
     """
     walls = []
     for ring, (opening_side, offset) in enumerate(openings):
         half_side = side / 2.0 - (1 + ring) * spacing
+        if abs(offset) + NESTED_OPENING_M / 2.0 >= half_side:
+            raise ValueError(f"opening at {offset} m: expected one within a side of {2.0 * half_side} m")
         corners = half_side * np.roll(np.array(SQUARE_CORNERS), -opening_side, axis=0)
         direction = (corners[1] - corners[0]) / (2.0 * half_side)
         middle = 0.5 * (corners[0] + corners[1]) + offset * direction
@@ -412,7 +423,7 @@ def build_nested_squares(side: float, spacing: float, openings: Sequence[tuple[i
 
 def build_corridors(name: str, side: float, walls: Sequence[WallObstacle]) -> Environment:
     """Build a square hall with walls, in which a team starts in a corner."""
-    starts = {"corner": DiscStart((1.1, 1.0), CORRIDOR_START_RADIUS_M)}
+    starts = {"corner": DiscStart(CORRIDOR_START_CENTER, CORRIDOR_START_RADIUS_M)}
     boundary = ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side))
     return Environment(name, boundary, tuple(walls), starts)
 
@@ -478,11 +489,8 @@ def measure_hard_maps(controller: str, count: int, pool: ProcessPoolExecutor) ->
     yield from pool.map(partial(measure_hard_case, controller), HARD_CASES)
 
 
-def run_in_corridors(controller: str, environment: Environment, communication_range: float) -> LimitedRun:
-    """Run a team in spiral corridors or between nested walls."""
-    starts = environment.start(None).sample(CORRIDOR_TEAM_SIZE, seed=0, radius=ROBOT_RADIUS_M)
-    team = Team.homogeneous(CORRIDOR_TEAM_SIZE, communication_range=communication_range)
-    record = Simulation(environment, make_controller(controller), starts, team).run(CORRIDOR_DURATION_S)
+def find_best_cost_in_corridors(environment: Environment) -> float:
+    """Return the cost of the best placement in spiral corridors or between nested walls, m."""
     optimum = find_optimum(
         environment,
         CORRIDOR_TEAM_SIZE,
@@ -490,26 +498,42 @@ def run_in_corridors(controller: str, environment: Environment, communication_ra
         lattice=HARD_MAP_LATTICE,
         restarts=REFERENCE_RESTARTS,
     )
+    return optimum.mean_distance
+
+
+def run_in_corridors(
+    controller: str, environment: Environment, best_cost: float, communication_range: float
+) -> LimitedRun:
+    """Run a team in spiral corridors or between nested walls."""
+    starts = environment.start(None).sample(CORRIDOR_TEAM_SIZE, seed=0, radius=ROBOT_RADIUS_M)
+    team = Team.homogeneous(CORRIDOR_TEAM_SIZE, communication_range=communication_range)
+    record = Simulation(environment, make_controller(controller), starts, team).run(CORRIDOR_DURATION_S)
     cost = CoverageCost(environment, HARD_MAP_LATTICE, radius=ROBOT_RADIUS_M)
     settling_time = find_settling_time(record.time, record.positions)
     return LimitedRun(
-        gap=cost(record.positions[-1]).mean_distance / optimum.mean_distance - 1.0,
+        gap=cost(record.positions[-1]).mean_distance / best_cost - 1.0,
         settling_time=math.nan if settling_time is None else settling_time,
         mean_path_length=float(compute_path_lengths(record.positions).mean()),
     )
 
 
 def measure_corridors(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """Yield gaps, rest and path lengths in each map, and the median for each kind of map."""
+    """Yield gaps, rest and path lengths on each map, and their medians for each kind of map."""
     kinds = {
         "spirals": [build_square_spiral(*case) for case in SPIRAL_CASES],
         "nested squares": [build_nested_squares(*case) for case in NESTED_CASES],
     }
+    best_costs = {
+        kind: list(pool.map(find_best_cost_in_corridors, environments))
+        for kind, environments in kinds.items()
+    }
     for communication_range in (math.inf, SHORT_RANGE_M):
+        conditions = f"communication range {communication_range:g} m"
+        if math.isinf(communication_range):
+            conditions = "unlimited communication"
         for kind, environments in kinds.items():
             run = partial(run_in_corridors, controller, communication_range=communication_range)
-            runs = list(pool.map(run, environments))
-            conditions = f"communication range {communication_range:g} m"
+            runs = list(pool.map(run, environments, best_costs[kind]))
             for environment, result in zip(environments, runs, strict=True):
                 rest = "not settled"
                 if not math.isnan(result.settling_time):
@@ -518,10 +542,10 @@ def measure_corridors(controller: str, count: int, pool: ProcessPoolExecutor) ->
                     f"{environment.name}, {conditions}: gap {result.gap:.1%}; {rest}; "
                     f"path length {result.mean_path_length:.1f} m"
                 )
-            settled = sum(not math.isnan(result.settling_time) for result in runs)
+            settled_count = sum(not math.isnan(result.settling_time) for result in runs)
             yield (
                 f"{kind}, {conditions}: median gap {np.median([result.gap for result in runs]):.1%}, "
-                f"{settled} of {len(runs)} settled, "
+                f"{settled_count} of {len(runs)} settled, "
                 f"median path length {np.median([result.mean_path_length for result in runs]):.1f} m"
             )
 

@@ -10,6 +10,6 @@
 - `routes`, `goal_candidates`: routes of robots, and the nodes that may become goals
 - `grid_planner`: all of these for one window, shared by the robots that share a map
 - `team_placement`, `own_goal`: goals of a team, and the goal of one robot
-- `viewpoint`: positions from which a robot can look into unknown space
+- `viewpoint`: positions from which a robot can look into unknown space, and how much this can be worth
 - `voronoi_roadmap`: the generalized Voronoi graph of a map
 """

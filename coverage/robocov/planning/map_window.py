@@ -36,13 +36,13 @@ class UnknownArea(NamedTuple):
     """
 
     patches: IntArray
-    """(p,) Label of the patch, from 1."""
+    """(k,) Label of the patch, from 1."""
     nodes: IntArray
-    """(p,) Index of the node."""
+    """(k,) Index of the node."""
     counts: FloatArray
-    """(p,) Number of these cells."""
+    """(k,) Number of cells of the patch that the node represents."""
     expected_free_counts: FloatArray
-    """(p,) Expected number of free ones among these cells."""
+    """(k,) Expected number of free cells among them."""
 
 
 @dataclass(eq=False)
@@ -169,7 +169,7 @@ class MapWindow:
         )
 
     def find_connected(self, positions: FloatArray) -> BoolArray:
-        """Find the positions that cells known to be free connect with the first position.
+        """Find which positions are connected with the first one through cells known to be free.
 
         Parameters
         ----------
@@ -178,7 +178,9 @@ class MapWindow:
         Returns
         -------
         (k,) bool array
-            False for positions outside the window and in unknown cells.
+            False for positions outside the window or in a cell that is not known to be free; False for all
+            positions if this holds for the first one. Positions outside the raster belong to its nearest
+            cell. The width of passages is ignored.
         """
         rows, columns = self.known_map.raster.find_cells(positions)
         rows = rows - self.window.first_row

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robocov.density import Density
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.map_window import MapWindow
 from robocov.planning.raster import SIDE_STEPS
@@ -16,7 +17,7 @@ _MIN_VIEWPOINT_DISTANCE_M = 0.6
 _ADDED_LENGTH_M = 1.0
 """Length that is added to paths, so that very short ones do not outweigh the value of a patch."""
 _MAX_TRIED_POSITIONS = 16
-"""Maximum number of positions in a patch at which another robot is tried."""
+"""Maximum number of positions in a patch that are tried for one more robot."""
 
 
 class _Candidates(NamedTuple):
@@ -41,18 +42,20 @@ def find_viewpoint(
     Parameters
     ----------
     map_window : MapWindow
-    patch_values : (p,) array
-        Value of a look into each patch, by label; 0 for patches that are not worth a visit.
+    patch_values : (1 + patches,) array
+        Value of looking into each patch, by label; 0 for patches that are not worth a visit.
     path_lengths : (m,) array, m
-        Distances from the robot to all nodes; infinite for nodes at which it does not look for viewpoints.
+        Distances from the robot's node to all nodes; infinite for nodes at which it does not look for
+        viewpoints.
     previous_viewpoints : sequence of (2,) arrays, m
         Viewpoints that the robot has already visited.
 
     Returns
     -------
     (2,) array or None, m
-        Center of a free cell at the border of the patch. It maximizes the value of the patch, divided by
-        (1 m + path length). None if no patch is worth a visit.
+        Center of a free cell next to an unknown patch: the one that maximizes the value of its patch, divided
+        by (1 m + path length). None if no patch is worth a visit, or all viewpoints there have been visited
+        or are infinitely far away.
     """
     frontier = map_window.frontier
     frontier_values = patch_values[frontier.patches]
@@ -77,7 +80,9 @@ def find_viewpoint(
     return np.asarray(_compute_first_center(map_window) + cell * map_window.known_map.raster.cell_size)
 
 
-def compute_patch_costs(map_window: MapWindow, cell_distances: FloatArray) -> FloatArray:
+def compute_patch_costs(
+    map_window: MapWindow, cell_distances: FloatArray, density: Density | None = None
+) -> FloatArray:
     """Compute the expected cost of each unknown patch.
 
     Parameters
@@ -85,81 +90,93 @@ def compute_patch_costs(map_window: MapWindow, cell_distances: FloatArray) -> Fl
     map_window : MapWindow
     cell_distances : (m,) array, m
         Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
+    density : Density or None
+        It is evaluated at each node; None means 1 everywhere.
 
     Returns
     -------
-    (p,) array
-        Expected costs by label, in cells times meters. The label 0 does not occur.
+    (1 + patches,) array
+        Expected costs by label, in cells times meters. Entry 0 is unused, because labels start at 1.
 
     Notes
     -----
     The expected cost of a patch is its contribution to the coverage cost: the sum, over its cells, of the
-    probability that the cell is free times the distance from the robot's goal in meters. For example, 50
-    cells that are free with probability 0.8, at a mean distance of 3 m, have an expected cost of 120. It is
-    close to zero for the inside of an obstacle.
+    probability that the cell is free times the density times the distance from the robot's goal in meters.
+    For example, 50 cells that are free with probability 0.8, at a mean distance of 3 m, have an expected cost
+    of 120 if the density is 1. It is close to zero for the inside of an obstacle.
     """
     # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
     unknown = map_window.unknown_area
-    return _sum_by_patch(map_window, cell_distances[unknown.nodes] * unknown.expected_free_counts)
+    weights = _weight_by_density(map_window, unknown.expected_free_counts, density)
+    return _sum_by_patch(map_window, cell_distances[unknown.nodes] * weights)
 
 
 def compute_possible_savings(
-    planner: GridPlanner, nearest_distances: FloatArray, min_saving: float
+    planner: GridPlanner,
+    nearest_distances: FloatArray,
+    density: Density | None = None,
+    *,
+    min_saving: float = 0.0,
 ) -> FloatArray:
-    """Compute how much a robot in each unknown patch could save if all cells of the patch were free.
+    """Compute how much one more robot in each unknown patch could save if all cells of the patch were free.
 
     Parameters
     ----------
     planner : GridPlanner
     nearest_distances : (m,) array, m
-        Distance from each node to the nearest robot.
+        Distance from each node to the nearest robot; infinite if no robot can reach it.
+    density : Density or None
+        It is evaluated at each node; None means 1 everywhere.
     min_saving : float
-        Smaller savings do not matter. The unit is that of the savings.
+        Savings count only if they exceed this value, in cells times meters.
 
     Returns
     -------
-    (p,) array
-        Savings by label, in cells times meters; 0 if they are less than `min_saving`, and for patches that
-        no viewpoint borders on. The label 0 does not occur.
+    (1 + patches,) array
+        Savings by label, in cells times meters; 0 if they are at most `min_saving`, and for patches without a
+        free cell at their border from which a robot could look in. Entry 0 is unused, because labels start at
+        1.
 
     Notes
     -----
     The expected cost (`compute_patch_costs`) is small for space among walls, because it may be the inside of
-    an obstacle. It may also be a winding corridor with its mouth in sight. The possible saving is then large:
-    the decrease of the sum of the distances from all cells of the patch to the nearest robot when one more
-    robot is placed in the patch. Of all positions for that robot, only some are tried.
+    an obstacle. It may also be a winding corridor whose entrance alone is visible. The possible saving is
+    then large: the decrease of the sum, over all cells of the patch, of the density times the distance to the
+    nearest robot when one more robot is placed in the patch. Only some positions are tried for this robot, so
+    the result may be slightly too low. Distances through unknown cells include the detour that `LatticeGraph`
+    assumes.
     """
     map_window = planner.map_window
     unknown = map_window.unknown_area
     # Nodes that no robot can reach do not count.
     distances = np.where(np.isfinite(nearest_distances), nearest_distances, 0.0)
-    # A robot cannot save more than the whole cost of a patch, which takes little time to compute.
-    upper_bounds = _sum_by_patch(map_window, distances[unknown.nodes] * unknown.counts)
+    weights = _weight_by_density(map_window, unknown.counts, density)
+    # No robot can save more than the current cost of the patch. This bound takes little time to compute, and
+    # rules out most patches.
+    upper_bounds = _sum_by_patch(map_window, distances[unknown.nodes] * weights)
     savings = np.zeros(len(upper_bounds))
     for patch in np.unique(map_window.frontier.patches):
         if upper_bounds[patch] > min_saving:
             is_in_patch = unknown.patches == patch
-            saving = _compute_saving(
-                planner, distances, unknown.nodes[is_in_patch], unknown.counts[is_in_patch]
-            )
+            saving = _compute_saving(planner, distances, unknown.nodes[is_in_patch], weights[is_in_patch])
             savings[patch] = saving if saving > min_saving else 0.0
     return savings
 
 
 def _compute_saving(
-    planner: GridPlanner, distances: FloatArray, patch_nodes: IntArray, counts: FloatArray
+    planner: GridPlanner, distances: FloatArray, patch_nodes: IntArray, weights: FloatArray
 ) -> float:
-    """Return how much a robot at the best of some nodes of a patch saves, in cells times meters.
+    """Return the saving of one more robot at the best of the nodes that are tried, in cells times meters.
 
     Parameters
     ----------
     planner : GridPlanner
     distances : (m,) array, m
         Distance from each node to the nearest of the present robots; 0 for nodes that none can reach.
-    patch_nodes : (p,) int array
+    patch_nodes : (k,) int array
         Nodes of the patch.
-    counts : (p,) array
-        Number of cells of the patch that each of these nodes represents.
+    weights : (k,) array
+        Number of cells of the patch that each of these nodes represents, times the density.
     """
     is_usable = planner.map_window.has_clearance[patch_nodes] & (distances[patch_nodes] > 0.0)
     usable_nodes = patch_nodes[is_usable]
@@ -167,8 +184,15 @@ def _compute_saving(
     patch_distances = distances[patch_nodes]
     max_distance = float(patch_distances.max())
     table = planner.graph.compute_distance_table(usable_nodes[::step], max_distance)[:, patch_nodes]
-    decreases = np.maximum(patch_distances - table, 0.0) @ counts
+    decreases = np.maximum(patch_distances - table, 0.0) @ weights
     return float(decreases.max(initial=0.0))
+
+
+def _weight_by_density(map_window: MapWindow, counts: FloatArray, density: Density | None) -> FloatArray:
+    """Multiply the counts of the entries of `map_window.unknown_area` by the density at their nodes."""
+    if density is None or density.is_uniform:
+        return counts
+    return counts * density.evaluate(map_window.nodes[map_window.unknown_area.nodes])
 
 
 def _sum_by_patch(map_window: MapWindow, values: FloatArray) -> FloatArray:

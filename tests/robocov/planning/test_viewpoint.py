@@ -1,12 +1,14 @@
-"""Viewpoints, and the value of a look into unknown parts of the region."""
+"""Viewpoints, the value of looking into unknown parts of the region, and connected positions."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+import pytest
 from planning_cases import HALVES, RASTER, WINDOW, build_planner
 
+from robocov.density import Raster as DensityRaster
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.viewpoint import compute_patch_costs, compute_possible_savings, find_viewpoint
@@ -17,7 +19,7 @@ BLOCK = (slice(10, 20), slice(10, 20))
 SHADOW = (slice(10, 20), slice(50, 60))
 """An unknown area among free cells."""
 CHAMBER = (slice(4, 36), slice(41, 76))
-"""An unknown area behind the wall of `HALVES`, or behind walls with a door."""
+"""An unknown area behind walls with a door."""
 
 
 def build_planner_with_obstacle_and_shadow() -> GridPlanner:
@@ -95,7 +97,7 @@ def test_the_possible_saving_is_that_of_the_best_position_in_the_patch() -> None
     map_window = planner.map_window
     robot = np.array([[3.0, 2.0]])
     nearest = planner.compute_distances_from(robot)
-    savings = compute_possible_savings(planner, nearest, 0.0)
+    savings = compute_possible_savings(planner, nearest)
     # The best of all nodes, by the definition of the saving.
     label = get_label(planner, CHAMBER)
     rows, columns = np.nonzero(map_window.patches == label)
@@ -114,13 +116,13 @@ def test_small_savings_and_patches_without_an_entrance_do_not_count() -> None:
     planner = build_planner_with_chamber(slice(17, 23))
     nearest = planner.compute_distances_from(np.array([[3.0, 2.0]]))
     label = get_label(planner, CHAMBER)
-    saving = compute_possible_savings(planner, nearest, 0.0)[label]
-    assert compute_possible_savings(planner, nearest, 0.99 * saving)[label] == saving
-    assert compute_possible_savings(planner, nearest, saving)[label] == 0.0
+    saving = compute_possible_savings(planner, nearest)[label]
+    assert compute_possible_savings(planner, nearest, min_saving=0.99 * saving)[label] == saving
+    assert compute_possible_savings(planner, nearest, min_saving=saving)[label] == 0.0
     closed = build_planner_with_chamber(slice(0, 0))
-    assert compute_possible_savings(closed, nearest, 0.0)[get_label(closed, CHAMBER)] == 0.0
+    assert compute_possible_savings(closed, nearest)[get_label(closed, CHAMBER)] == 0.0
     too_narrow = build_planner_with_chamber(slice(19, 21))
-    assert compute_possible_savings(too_narrow, nearest, 0.0)[get_label(too_narrow, CHAMBER)] == 0.0
+    assert compute_possible_savings(too_narrow, nearest)[get_label(too_narrow, CHAMBER)] == 0.0
 
 
 def test_a_robot_in_the_patch_leaves_little_to_save() -> None:
@@ -128,8 +130,24 @@ def test_a_robot_in_the_patch_leaves_little_to_save() -> None:
     label = get_label(planner, CHAMBER)
     outside = planner.compute_distances_from(np.array([[3.0, 2.0]]))
     inside = planner.compute_distances_from(np.array([[3.0, 2.0], [5.8, 2.0]]))
-    savings = [compute_possible_savings(planner, nearest, 0.0)[label] for nearest in (outside, inside)]
+    savings = [compute_possible_savings(planner, nearest)[label] for nearest in (outside, inside)]
     assert savings[1] < 0.5 * savings[0]
+
+
+def test_costs_and_savings_are_proportional_to_the_density() -> None:
+    """The density is 4 in the right half, which contains the chamber, and 1 in the left half."""
+    planner = build_planner_with_chamber(slice(17, 23))
+    label = get_label(planner, CHAMBER)
+    nearest = planner.compute_distances_from(np.array([[3.0, 2.0]]))
+    density = DensityRaster(np.array([[1.0, 4.0]]), extent=RASTER.region.bounds, interpolation="cells")
+    savings, weighted_savings = (
+        compute_possible_savings(planner, nearest, each)[label] for each in (None, density)
+    )
+    assert weighted_savings == pytest.approx(4.0 * savings)
+    costs, weighted_costs = (
+        compute_patch_costs(planner.map_window, nearest, each)[label] for each in (None, density)
+    )
+    assert weighted_costs == pytest.approx(4.0 * costs)
 
 
 def test_positions_are_connected_if_a_path_through_free_cells_is_known() -> None:
@@ -138,5 +156,7 @@ def test_positions_are_connected_if_a_path_through_free_cells_is_known() -> None
     map_window = GridPlanner(DiscoveredMap(RASTER, state), WINDOW, CLEARANCE_M).map_window
     positions = np.array([[1.0, 1.0], [3.0, 3.5], [4.5, 2.0], [7.0, 1.0]])
     assert map_window.find_connected(positions).tolist() == [True, True, False, False]
+    # The first position is not in a cell that is known to be free.
+    assert not map_window.find_connected(positions[[2, 0, 1]]).any()
     assert map_window.find_connected(positions[[3, 0, 3]]).tolist() == [True, False, True]
     assert not map_window.find_connected(positions[[2, 0]]).any()

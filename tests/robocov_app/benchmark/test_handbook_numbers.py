@@ -632,8 +632,9 @@ def read_earlier_rows(correction: str, controller: str, track: str) -> list[dict
     """Return the rows of a controller on a track before a correction of the benchmark.
 
     ``earlier_results.csv`` contains rows of entries of earlier versions: "messages" of those before robots
-    shared maps by messages, "stake" of the last ones with ``stake`` = 0.004, and "visits" of the last one in
-    which robots of `frontier-median` assumed that those out of range had reached their targets.
+    shared maps by messages, "stake" of the last ones with ``stake`` = 0.004, "visits" of the last one in
+    which robots of `frontier-median` assumed that those out of range had reached their targets, and "looks"
+    of the last ones in which robots did not look into space among walls.
     """
     with Path(__file__).with_name("earlier_results.csv").open(encoding="utf-8", newline="") as file:
         return [
@@ -709,6 +710,14 @@ def test_changes_by_the_gain_stake_agree_with_the_entries(track: str, controller
 def test_changes_of_frontier_median_agree_with_the_entries(track: str) -> None:
     cells = format_changes_on_track("visits", "frontier-median", track)
     row = f"| {suite.format_heading(track)} | {' | '.join(cells)} |"
+    assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("controller", ["atlas", "atlas-shared"])
+@pytest.mark.parametrize("track", [*suite.RANKED_TRACKS["core"], *PLAN_TRACKS])
+def test_changes_by_looks_among_walls_agree_with_the_entries(track: str, controller: str) -> None:
+    cells = format_changes_on_track("looks", controller, track)
+    row = f"| {suite.format_heading(track)} | `{controller}` | {' | '.join(cells)} |"
     assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
 
 

@@ -42,6 +42,7 @@ from robocov.controllers.exploration.team_knowledge import (
 )
 from robocov.controllers.exploration.teammates import TeammateReport, Teammates
 from robocov.controllers.gains import gain, response_time_gain
+from robocov.density import Density
 from robocov.observation import Decision, Message, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
@@ -68,10 +69,10 @@ _LISTENING_S = 2.0
 _SHARED_PATIENCE_FACTOR = 2.5
 """Factor of the gain `patience` if all robots learn what one of them sees."""
 _MIN_POSSIBLE_SAVING = 0.15
-"""Fraction of the coverage cost that a robot in unknown space among walls must be able to save, if all of
-that space is free, before another robot looks into it."""
+"""Fraction of the coverage cost that one more robot, placed in an unknown patch, must save if the whole patch
+is free. Robots do not look into patches that save less, unless these are worth the gain `stake`."""
 _POSSIBLE_SAVING_DOUBLING_LENGTH = 1.0
-"""Path length to viewpoints that doubles this fraction, in diameters of the region."""
+"""Path length to viewpoints that doubles `_MIN_POSSIBLE_SAVING`, in diameters of the region."""
 _MIN_PROGRESS_M = 0.05
 """A robot that has not arrived at its goal and moves less than this between two plans is stuck."""
 _SWAP_SAVING = 0.1
@@ -94,7 +95,8 @@ class Atlas(BaseController):
     1. *Plan for the team.* It computes goals for all robots that it knows of. Robots at rest keep their
        positions.
     2. *Own goal.* It refines its own goal on a finer lattice.
-    3. *Viewpoints.* At its goal, it looks at unknown parts of its cell if these matter enough for the cost.
+    3. *Viewpoints.* At its goal, it looks at unknown parts of its cell if these matter enough for the cost,
+       and at other unknown space that no other robot is closer to if this could save much.
     4. *Route.* It follows the shortest path on its map, and brakes before walls and other robots.
 
     The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
@@ -111,7 +113,7 @@ class Atlas(BaseController):
         Fraction of the cost of its own cell that a robot's new goal must save.
     stake : float
         Fraction of the coverage cost that unknown space must be expected to contribute before a robot moves
-        to a viewpoint to look at it.
+        to a viewpoint to look at it; see Notes for an exception. With 1, robots never move to viewpoints.
     patience : float
         Path length to viewpoints after which this fraction is doubled, in diameters of the region.
     settling : float
@@ -148,10 +150,10 @@ class Atlas(BaseController):
     *Own goal and viewpoints.* A new goal must save the fraction `rest` of the cost of the robot's own cell. A
     robot moves to a viewpoint if the unknown space that it would see there is expected to contribute at least
     the fraction `stake` of the cost. This fraction doubles with the length of the paths to viewpoints
-    (`patience`). Unknown space among walls is expected to be the inside of an obstacle, but may also be a
-    winding corridor. A robot at rest also looks into it if a robot in there could save a large fraction of
-    the cost, should all of that space be free. A robot that knows of no others does not look for viewpoints,
-    because its goal hardly depends on unknown space.
+    (`patience`). Unknown space among walls is probably the inside of an obstacle, but may be a winding
+    corridor. A robot at its goal therefore also looks into unknown space if one more robot there would save a
+    large fraction of the cost, assuming that all of the space is free. A robot that knows of no others does
+    not look for viewpoints, because its goal hardly depends on unknown space.
 
     *Coming to rest.* The required savings double with the path length of a robot (`settling`), not with time,
     so that a team at rest still responds to changes. Path lengths start from zero when a robot joins or
@@ -469,9 +471,10 @@ class Atlas(BaseController):
         # After a change of the team or the walls, the path length starts from zero.
         added_length = max(state.path.length - previous.path.length, 0.0)
         path = _extend_viewpoint_path(state, position, added_length)
-        motion = self._choose_motion(replace(state, path=path), cooperation, own, position)
+        state = replace(state, path=path)
+        motion = self._choose_motion(state, cooperation, own, position, seen.density)
         goal = motion.goal if motion.viewpoint is None else motion.viewpoint
-        return replace(state, path=path, motion=motion), goal
+        return replace(state, motion=motion), goal
 
     def _find_own_goal(
         self, state: PlannerState, seen: Observations, cooperation: Cooperation
@@ -492,7 +495,12 @@ class Atlas(BaseController):
         )
 
     def _choose_motion(
-        self, state: PlannerState, cooperation: Cooperation, own: OwnGoal, position: FloatArray
+        self,
+        state: PlannerState,
+        cooperation: Cooperation,
+        own: OwnGoal,
+        position: FloatArray,
+        density: Density | None,
     ) -> OwnMotion:
         """Return a robot's motion: straight to its own goal, or first to a viewpoint.
 
@@ -509,35 +517,49 @@ class Atlas(BaseController):
         # The goal of a lone robot hardly depends on unknown space, so it needs no viewpoints.
         has_others = len(state.basis.robots) > 1
         if node != NO_NODE and self.stake < 1.0 and has_others:
-            viewpoint = self._find_viewpoint(state, cooperation, own, node)
+            viewpoint = self._find_viewpoint(state, cooperation, own, node, density)
         return OwnMotion(own.goal, viewpoint, is_idle=viewpoint is None)
 
     def _find_viewpoint(
-        self, state: PlannerState, cooperation: Cooperation, own: OwnGoal, node: int
+        self,
+        state: PlannerState,
+        cooperation: Cooperation,
+        own: OwnGoal,
+        node: int,
+        density: Density | None,
     ) -> FloatArray | None:
-        """Return the viewpoint to which a robot at a node moves next, (2,) m; None if none is worth it."""
+        """Return the viewpoint to which a robot at a node moves next, (2,) m; None if there is none."""
         assert state.basis is not None
         planner = state.basis.planner
         # The longer the path to viewpoints already is, the more must be gained from another one.
         patience = self.patience * (_SHARED_PATIENCE_FACTOR if cooperation.is_agreed else 1.0)
         doubling_length = patience * state.known_map.raster.region.diameter
         doublings = min(state.path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
-        costs = compute_patch_costs(planner.map_window, own.cell_distances)
-        costs[costs <= self.stake * own.cost * 2.0**doublings] = 0.0
+        costs = compute_patch_costs(planner.map_window, own.cell_distances, density)
+        min_cost = self.stake * own.cost * 2.0**doublings
+        costs[costs <= min_cost] = 0.0
         path_lengths = planner.graph.get_distances(node)
         viewpoint = find_viewpoint(planner.map_window, costs, path_lengths, state.path.viewpoints)
         if viewpoint is not None:
             return viewpoint
-        return self._find_viewpoint_among_walls(state, cooperation, own, node)
+        return self._find_viewpoint_by_possible_saving(state, cooperation, own, node, density)
 
-    def _find_viewpoint_among_walls(
-        self, state: PlannerState, cooperation: Cooperation, own: OwnGoal, node: int
+    def _find_viewpoint_by_possible_saving(
+        self,
+        state: PlannerState,
+        cooperation: Cooperation,
+        own: OwnGoal,
+        node: int,
+        density: Density | None,
     ) -> FloatArray | None:
-        """Return a viewpoint for a look into space that is unlikely to be free but would matter if it were.
+        """Return a viewpoint at an unknown patch that would matter if it were free; None if there is none.
 
-        Unknown space among walls is probably the inside of an obstacle, but it may also be a winding
-        corridor. A robot moves to a viewpoint there only if it knows of no other robot that is closer, and if
-        no other robot is moving, unless all robots plan on the same map.
+        The expected cost hardly counts unknown space among walls. Here, all unknown cells count fully, in the
+        cells of other robots as well. The robot leaves patches to others whose expected position is closer.
+
+        A robot with its own map sets out only while all others that it knows of are at rest or out of
+        contact, because the placement is worse while it is away. On its way to any viewpoint, it may
+        continue. Robots that all plan on the same map need not wait.
         """
         assert state.basis is not None
         is_heading_for_viewpoint = state.motion is not None and state.motion.viewpoint is not None
@@ -550,19 +572,23 @@ class Atlas(BaseController):
         savings = compute_possible_savings(
             planner,
             planner.compute_distances_from(np.vstack([own.goal, other_positions])),
+            density,
             min_saving=_MIN_POSSIBLE_SAVING * own.cost * 2.0**doublings,
         )
-        # Of the space between a robot and another one that it cannot reach through known space, it does not
-        # know whether there is a path.
+        # If no known free space connects another robot with this one, the path between them may be blocked.
+        # The other robot then does not count as closer.
         is_connected = planner.map_window.find_connected(state.basis.positions)[1:]
         other_distances = planner.compute_distances_from(other_positions[is_connected])
+        # The robot's own path starts at its node, which makes it slightly too short. Therefore, two robots at
+        # nearly the same distance may both go.
         path_lengths = planner.graph.get_distances(node)
-        path_lengths = np.where(path_lengths < other_distances, path_lengths, np.inf)
-        return find_viewpoint(planner.map_window, savings, path_lengths, state.path.viewpoints)
+        is_closest = path_lengths < other_distances
+        own_path_lengths = np.where(is_closest, path_lengths, np.inf)
+        return find_viewpoint(planner.map_window, savings, own_path_lengths, state.path.viewpoints)
 
 
 def _predict_other_positions(state: PlannerState, cooperation: Cooperation) -> FloatArray:
-    """Return the positions of the other robots in a robot's plan, (k, 2) m; their goals if they move."""
+    """Return where a robot expects the k others, (k, 2) m: mobile ones at their goals in its plan."""
     assert state.basis is not None and state.team_goals is not None
     team_goals = state.team_goals.goals
     is_mobile = ~cooperation.is_fixed

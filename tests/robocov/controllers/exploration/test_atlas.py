@@ -223,12 +223,76 @@ def test_a_single_robot_moves_to_the_center() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "duration"), [(Atlas, 60.0), (AtlasShared, 40.0)])
-def test_robots_look_into_winding_corridors_before_they_settle(kind: type[Atlas], duration: float) -> None:
+def test_robots_cover_winding_corridors(kind: type[Atlas], duration: float) -> None:
     """The space behind the walls could be the inside of an obstacle, but most of the cost may be there."""
     record = Simulation(SPIRAL, kind(), SPIRAL_STARTS, dt=0.05).run(duration)
-    cost = CoverageCost(SPIRAL, lattice=48, radius=ROBOT_RADIUS_M)
-    best = find_optimum(SPIRAL, 4, lattice=32, restarts=4)
+    cost = CoverageCost(SPIRAL, lattice=32, radius=ROBOT_RADIUS_M)
+    best = find_optimum(SPIRAL, 4, radius=ROBOT_RADIUS_M, lattice=32, restarts=4)
     assert cost(record.positions[-1]).mean_distance < 1.1 * best.mean_distance
+
+
+def build_planner_state(
+    known_map: DiscoveredMap,
+    positions: np.ndarray,
+    team_goals: np.ndarray,
+    *,
+    is_quiet: bool = True,
+    is_heading_for_viewpoint: bool = False,
+    viewpoint_length: float = 0.0,
+) -> PlannerState:
+    """Build the state of the first robot of a team, which is at its goal or on its way to a viewpoint."""
+    window = Window.build_around(known_map.raster, np.array([4.0, 4.0]), math.inf, 1000)
+    planner = GridPlanner(known_map, window, 0.15)
+    robots = np.arange(len(positions))
+    goal = positions[0]
+    return PlannerState(
+        known_map=known_map,
+        next_plan_time=0.0,
+        knowledge=TeamKnowledge(Teammates.build_empty()),
+        path=TraveledPath(viewpoint_length=viewpoint_length),
+        basis=PlanBasis(known_map, planner, robots, positions, is_quiet=is_quiet),
+        team_goals=TeamGoals(planner, robots, team_goals),
+        motion=OwnMotion(goal, goal if is_heading_for_viewpoint else None),
+    )
+
+
+def build_cooperation(
+    team_size: int, *, is_agreed: bool = False, are_others_fixed: bool = True
+) -> Cooperation:
+    """Build the cooperation of a robot that plans for itself, or with an agreed map."""
+    return Cooperation(
+        is_agreed=is_agreed,
+        is_joint=False,
+        group_size=team_size,
+        is_fixed=np.full(team_size - 1, are_others_fixed),
+        savings_factor=1.0,
+    )
+
+
+def test_robots_look_at_open_space_that_is_expected_to_contribute_enough() -> None:
+    """An unknown square of 1 m among free cells contributes 100 cells at a distance of 2 m."""
+    raster = Raster(ROOMS.region, 0.1)
+    state = np.full(raster.shape, FREE, dtype=np.uint8)
+    state[35:45, 55:65] = UNKNOWN
+    positions = np.array([[2.0, 4.0], [1.0, 1.0]])
+
+    def find_viewpoint(stake: float, viewpoint_length: float = 0.0) -> np.ndarray | None:
+        planner_state = build_planner_state(
+            DiscoveredMap(raster, state), positions, positions, viewpoint_length=viewpoint_length
+        )
+        assert planner_state.basis is not None
+        planner = planner_state.basis.planner
+        node = planner.visibility.find_entry_node(positions[0])
+        distances = np.full(len(planner.map_window.nodes), 2.0)
+        own = OwnGoal(goal=positions[0], node=node, cell_distances=distances, cost=1e4)
+        controller = Atlas(stake=stake)
+        return controller._find_viewpoint(planner_state, build_cooperation(2), own, node, None)
+
+    assert find_viewpoint(stake=0.019) is not None
+    assert find_viewpoint(stake=0.021) is None
+    patience = Atlas().patience * ROOMS.region.diameter
+    assert find_viewpoint(stake=0.019, viewpoint_length=0.05 * patience) is not None
+    assert find_viewpoint(stake=0.019, viewpoint_length=0.1 * patience) is None
 
 
 def find_viewpoint_at_chamber(
@@ -238,11 +302,14 @@ def find_viewpoint_at_chamber(
     is_quiet: bool = True,
     is_heading_for_viewpoint: bool = False,
     viewpoint_length: float = 0.0,
+    other_goal: list[float] | None = None,
+    cost: float = 1e4,
 ) -> np.ndarray | None:
-    """Find the viewpoint of the first robot for a look into an unknown chamber.
+    """Find the viewpoint from which the first robot looks into an unknown chamber.
 
     The chamber is on the right of a square of 8 m, and has a door of 1 m at x = 4, between y = 3.5 and 4.5. A
-    wall at y = 6.5 divides the square. A part of it is unknown, and the space above it is known.
+    wall at y = 6.5 divides the square. One meter of this wall is unknown; everything above it is free. The
+    second robot moves to `other_goal`, or stays at its position. The cost is in cells times meters.
     """
     raster = Raster(ROOMS.region, 0.1)
     state = np.full(raster.shape, FREE, dtype=np.uint8)
@@ -251,55 +318,66 @@ def find_viewpoint_at_chamber(
     state[35:45, 40:42] = UNKNOWN
     state[65, :] = WALL
     state[65, 30:40] = UNKNOWN
-    known_map = DiscoveredMap(raster, state)
-    window = Window.build_around(raster, np.array([4.0, 4.0]), math.inf, 1000)
-    planner = GridPlanner(known_map, window, 0.15)
-    robot_positions = np.array(positions)
-    robots = np.arange(len(positions))
-    goal = robot_positions[0]
-    planner_state = PlannerState(
-        known_map=known_map,
-        next_plan_time=0.0,
-        knowledge=TeamKnowledge(Teammates.build_empty()),
-        path=TraveledPath(viewpoint_length=viewpoint_length),
-        basis=PlanBasis(known_map, planner, robots, robot_positions, is_quiet=is_quiet),
-        team_goals=TeamGoals(planner, robots, robot_positions),
-        motion=OwnMotion(goal, goal if is_heading_for_viewpoint else None),
+    team_goals = np.array(positions)
+    if other_goal is not None:
+        team_goals[1] = other_goal
+    planner_state = build_planner_state(
+        DiscoveredMap(raster, state),
+        np.array(positions),
+        team_goals,
+        is_quiet=is_quiet,
+        is_heading_for_viewpoint=is_heading_for_viewpoint,
+        viewpoint_length=viewpoint_length,
     )
-    cooperation = Cooperation(
-        is_agreed=is_agreed,
-        is_joint=False,
-        group_size=len(positions),
-        is_fixed=np.ones(len(positions) - 1, dtype=bool),
-        savings_factor=1.0,
-    )
-    node = planner.visibility.find_entry_node(goal)
-    own = OwnGoal(goal=goal, node=node, cell_distances=np.zeros(len(planner.map_window.nodes)), cost=1e4)
-    return Atlas()._find_viewpoint_among_walls(planner_state, cooperation, own, node)
+    assert planner_state.basis is not None
+    planner = planner_state.basis.planner
+    cooperation = build_cooperation(len(positions), is_agreed=is_agreed, are_others_fixed=other_goal is None)
+    node = planner.visibility.find_entry_node(team_goals[0])
+    distances = np.zeros(len(planner.map_window.nodes))
+    own = OwnGoal(goal=team_goals[0], node=node, cell_distances=distances, cost=cost)
+    return Atlas()._find_viewpoint_by_possible_saving(planner_state, cooperation, own, node, None)
 
 
-def test_a_robot_at_rest_looks_into_a_chamber_if_no_other_is_closer() -> None:
+def test_a_robot_at_its_goal_looks_into_a_chamber_if_no_other_is_closer() -> None:
     viewpoint = find_viewpoint_at_chamber([[2.0, 4.0], [1.0, 1.0]])
     assert viewpoint is not None
     assert 3.8 < viewpoint[0] < 4.1
     assert 3.5 < viewpoint[1] < 4.5
     assert find_viewpoint_at_chamber([[2.0, 4.0], [3.0, 4.0]]) is None
-    # Through unknown space, the other robot may be closer, but the robot does not know whether it can pass.
+    # The other path may be shorter, but leads through unknown space, so it may be blocked.
     assert find_viewpoint_at_chamber([[0.5, 4.0], [3.5, 7.0]]) is not None
 
 
-def test_robots_with_their_own_maps_look_into_chambers_one_after_the_other() -> None:
+def test_moving_robots_are_expected_at_their_goals() -> None:
+    near, far = [3.0, 4.0], [1.0, 1.0]
+    assert find_viewpoint_at_chamber([[2.0, 4.0], far], other_goal=near) is None
+    assert find_viewpoint_at_chamber([[2.0, 4.0], near], other_goal=far) is not None
+
+
+def test_a_robot_with_its_own_map_waits_until_the_others_are_at_rest() -> None:
     positions = [[2.0, 4.0], [1.0, 1.0]]
     assert find_viewpoint_at_chamber(positions, is_quiet=False) is None
     assert find_viewpoint_at_chamber(positions, is_quiet=False, is_heading_for_viewpoint=True) is not None
     assert find_viewpoint_at_chamber(positions, is_quiet=False, is_agreed=True) is not None
 
 
-def test_a_robot_that_has_looked_around_a_lot_leaves_chambers_alone() -> None:
+def test_patches_must_save_more_after_long_paths_to_viewpoints() -> None:
+    """The saving that is required doubles with each diameter of the region."""
     positions = [[2.0, 4.0], [1.0, 1.0]]
     diameter = ROOMS.region.diameter
-    assert find_viewpoint_at_chamber(positions, viewpoint_length=0.1 * diameter) is not None
-    assert find_viewpoint_at_chamber(positions, viewpoint_length=4.0 * diameter) is None
+    low, high = 1e4, 1e7
+    assert find_viewpoint_at_chamber(positions, cost=high) is None
+    while high > 1.02 * low:
+        cost = math.sqrt(low * high)
+        if find_viewpoint_at_chamber(positions, cost=cost) is None:
+            high = cost
+        else:
+            low = cost
+    for doublings in (1, 3):
+        cost = low * 0.5**doublings
+        short, long = (doublings - 0.1) * diameter, (doublings + 0.1) * diameter
+        assert find_viewpoint_at_chamber(positions, cost=cost, viewpoint_length=short) is not None
+        assert find_viewpoint_at_chamber(positions, cost=cost, viewpoint_length=long) is None
 
 
 @pytest.mark.slow
