@@ -12,8 +12,8 @@ from robocov.errors import to_one_line
 from robocov.typing import FloatArray
 from robocov_app.formats import files
 
-NodePosition: TypeAlias = tuple[float, float] | None
-"""Longitude and latitude of a node in degrees, or None if they are unknown."""
+LonLat: TypeAlias = tuple[float, float]
+"""Longitude and latitude in degrees."""
 USED_TAGS = {
     "area", "barrier", "building", "door", "entrance", "highway", "indoor", "layer", "level", "location",
     "name", "natural", "repeat_on", "room", "stairs", "tunnel", "type", "water", "waterway", "width",
@@ -110,25 +110,25 @@ class OsmData:
         """Return whether the position of a node is known."""
         return node_id in self._node_rows
 
-    def add_way_node(self, node_id: int, position: NodePosition) -> None:
+    def add_way_node(self, node_id: int, position: LonLat | None) -> None:
         """Add the position of a node that a way contains (``out geom``), unless it is known.
 
         Parameters
         ----------
         node_id : int
-        position : NodePosition
+        position : LonLat or None
             None if the way does not contain the position.
         """
         if position is not None and not self.has_node(node_id):
             longitude, latitude = position
             self.add_node(node_id, longitude, latitude)
 
-    def add_line(self, line: list[NodePosition]) -> list[int]:
+    def add_line(self, line: list[LonLat | None]) -> list[int]:
         """Add nodes that have no id in the file, and return new ids for them.
 
         Parameters
         ----------
-        line : list of NodePosition
+        line : list of LonLat or None
             Position of each node. None stands for a node outside the extract.
         """
         ids = []
@@ -142,13 +142,13 @@ class OsmData:
             ids.append(node_id)
         return ids
 
-    def add_relation_way(self, way_id: int, line: list[NodePosition]) -> None:
+    def add_relation_way(self, way_id: int, line: list[LonLat | None]) -> None:
         """Add a way from the node positions in a relation (``out geom``), unless the way is known.
 
         Parameters
         ----------
         way_id : int
-        line : list of NodePosition
+        line : list of LonLat or None
             Positions of the nodes, as in `add_line`; empty if the relation does not contain them.
         """
         if line and way_id not in self.ways:

@@ -17,7 +17,7 @@ from xml.parsers import expat
 from robocov.errors import JsonPath, MapError, quote, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.files import JsonFile, is_number
-from robocov_app.formats.geodata.osm.data import USED_TAGS, NodePosition, OsmData, OsmElement
+from robocov_app.formats.geodata.osm.data import USED_TAGS, LonLat, OsmData, OsmElement
 
 XML_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
 _JSON_ELEMENTS = re.compile(rb'"elements"\s*:\s*\[')
@@ -59,7 +59,7 @@ class _XmlReader:
         files.require_vertices(content.count(b"<tag") // 2, source_name)
         self.element: OsmElement | None = None
         self.member_id: int | None = None  # of the current member of a relation, if it is a way
-        self.member_line: list[NodePosition] = []
+        self.member_line: list[LonLat | None] = []
         self.depth = 0
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start_element
@@ -100,7 +100,7 @@ class _XmlReader:
             self._read_child(self.element, name, attributes)
 
     def _read_child(self, element: OsmElement, name: str, attributes: dict[str, str]) -> None:
-        """Read a tag or a member of a node, way or relation, or a node of a member."""
+        """Read a child of a node, way or relation: a tag, a node of a way, or a member or its nodes."""
         if name == "nd" and self.depth == 3:
             # A node of a way, with its position for `out geom`.
             node_id = int(attributes["ref"])
@@ -194,7 +194,7 @@ def _parse_json_tags(file: JsonFile, value: dict[str, Any], location: JsonPath) 
     return {key: text for key, text in tags.items() if key in USED_TAGS and isinstance(text, str)}
 
 
-def _parse_json_point(file: JsonFile, value: Any, location: JsonPath) -> tuple[float, float]:
+def _parse_json_point(file: JsonFile, value: Any, location: JsonPath) -> LonLat:
     if not isinstance(value, dict):
         raise file.build_error(location, value, "lat and lon")
     for key, limit in (("lon", 360.0), ("lat", 90.0)):
@@ -242,17 +242,17 @@ def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], locat
     return numbers
 
 
-def _parse_json_line(file: JsonFile, value: Any, location: JsonPath) -> list[NodePosition]:
+def _parse_json_line(file: JsonFile, value: Any, location: JsonPath) -> list[LonLat | None]:
     """Return the points of a line, with None for points outside the query's bounding box."""
     if not isinstance(value, list):
         raise file.build_error(location, value, "a list of lat and lon")
-    line: list[NodePosition] = []
+    line: list[LonLat | None] = []
     for k, point in enumerate(value):
         line.append(None if point is None else _parse_json_point(file, point, (*location, k)))
     return line
 
 
-def _parse_position(attributes: Mapping[str, str]) -> NodePosition:
+def _parse_position(attributes: Mapping[str, str]) -> LonLat | None:
     """Return the longitude and latitude of a node of a way, or None if it is given without them."""
     if "lat" not in attributes and "lon" not in attributes:
         return None
