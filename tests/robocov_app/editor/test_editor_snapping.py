@@ -197,6 +197,26 @@ def test_dragged_objects_are_not_targets():
     assert snap_point((9.02, 5.0), with_drawn_point, build_settings("vertex")).point == (9.0, 5.0)
 
 
+def test_a_circle_or_wall_is_no_target_of_its_own_vertices():
+    wall = WallObstacle(((1.0, 1.0), (3.0, 1.0), (5.0, 1.0)), 0.2)
+    disc = DiscStart((3.0, 6.0), 1.0)
+    sketch, (circle_key, wall_key) = Sketch(starts=(("disc", disc),)).with_obstacles([PILLAR, wall])
+    kinds = build_settings("vertex", "center", "edge")
+
+    def snap(point: tuple[float, float], dragged: Vertex) -> tuple[float, float]:
+        return snap_point(point, collect_snap_targets(sketch, ignored=[dragged]), kinds).point
+
+    for near_center in ((7.06, 5.06), (7.56, 5.06)):
+        for index in (0, 1):
+            assert snap(near_center, Vertex(circle_key, 0, index)) == near_center
+    for near_start in ((3.03, 6.03), (4.03, 6.03)):
+        assert snap(near_start, Vertex("disc", 0, 1)) == near_start
+    near_end = (5.03, 1.08)
+    assert snap(near_end, Vertex(wall_key, 0, 2)) == near_end
+    # Sections of the wall that stay where they are remain targets.
+    assert snap((2.0, 1.03), Vertex(wall_key, 0, 2)) == pytest.approx((2.0, 1.0))
+
+
 def test_faces_of_walls_and_rims_of_circles_are_targets():
     wall = WallObstacle(((1.0, 1.0), (5.0, 1.0)), 0.2)
     targets = collect_snap_targets(Sketch().with_obstacles([wall, PILLAR])[0])

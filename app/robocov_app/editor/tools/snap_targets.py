@@ -34,16 +34,12 @@ class _TargetCollector:
     def add(self, sketch: Sketch, owner: Owner) -> None:
         """Add the points and edges of an object."""
         shape = sketch.get_shape(owner)
-        if isinstance(shape, CircleObstacle | DiscStart):
-            self.centers.append(shape.center)
-            self.other_points += sketch.list_vertex_rings(owner)[0][1:]
-        if isinstance(shape, CircleObstacle):
-            self.circles.append(build_geometry(shape))
-        elif isinstance(shape, WallObstacle):
-            self.walls.append(build_geometry(shape))
-        elif isinstance(shape, PointsStart):
-            dragged = self.dragged[owner, 0]
+        dragged = self.dragged[owner, 0]
+        if isinstance(shape, PointsStart):
             self.centers += [point for k, point in enumerate(shape.positions) if k not in dragged]
+        elif not dragged:
+            # Each vertex of a circle or wall changes its outline.
+            self._add_outline(sketch, owner)
         for ring in sketch.list_rings(owner):
             self._add_ring(ring, self.dragged[owner, ring.number])
 
@@ -55,6 +51,17 @@ class _TargetCollector:
         # The pointer also snaps to the visible outlines of walls and circles.
         outlines = list_outline_edges([*self.walls, *self.circles])
         return SnapTargets(vertices, to_array(self.centers), Edges(starts, ends), outlines)
+
+    def _add_outline(self, sketch: Sketch, owner: Owner) -> None:
+        """Add the center and the rim of a circle, or the outline of a wall."""
+        shape = sketch.get_shape(owner)
+        if isinstance(shape, CircleObstacle | DiscStart):
+            self.centers.append(shape.center)
+            self.other_points += sketch.list_vertex_rings(owner)[0][1:]
+        if isinstance(shape, CircleObstacle):
+            self.circles.append(build_geometry(shape))
+        elif isinstance(shape, WallObstacle):
+            self.walls.append(build_geometry(shape))
 
     def _add_ring(self, ring: VertexRing, dragged: set[int]) -> None:
         points = ring.points
