@@ -45,6 +45,16 @@ def test_polygons_are_found_in_every_container(tmp_path: Path, document: Any) ->
     assert detect_format(tmp_path / "plan.geojson").name == "geojson"
 
 
+def test_a_floor_that_reaches_to_the_middle_of_the_walls_is_the_boundary(tmp_path: Path) -> None:
+    document = build_collection(
+        build_feature(build_polygon(build_square(0, 0, 10, 10), build_square(1, 1, 8, 8)), name="walls"),
+        build_feature(build_polygon(build_square(0.2, 0.2, 9.6, 9.6)), name="floor"),
+    )
+    foreign = read(tmp_path, "geojson", document)
+    assert foreign.boundary_source == "the largest closed outline, 'floor', of 92.16 m²"
+    assert foreign.free.equals(shapely.box(1, 1, 9, 9))
+
+
 def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
     document = build_collection(
         build_feature(build_polygon(build_square(0, 0, 20, 10)), name="yard"),

@@ -222,9 +222,10 @@ def _find_outermost_outlines(drawing: Drawing) -> Boundary | None:
     is_inner[inner] = True
     if not is_inner.any() and len(areas) > 1:
         return None
-    members = set(np.array(drawing.outlines, dtype=object)[~is_inner])
-    largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
-    return _join_outlines(drawing, largest, members)
+    outermost = np.array(drawing.outlines, dtype=object)[~is_inner].tolist()
+    # The outline with the largest filled area may lie in another one: walls around a floor, for example.
+    largest = max(outermost, key=lambda outline: outline.filled_area)
+    return _join_outlines(drawing, largest, set(outermost))
 
 
 def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[ClosedOutline]) -> Boundary:
