@@ -273,6 +273,14 @@ def test_jpeg_is_read(tmp_path: Path, mode: str) -> None:
     np.testing.assert_allclose(shade(picture), np.asarray(image).sum(axis=2) / 765, atol=0.05)
 
 
+def test_a_jpeg_with_several_pictures_is_read_as_a_jpeg(tmp_path: Path) -> None:
+    image = Image.new("RGB", (32, 16), (250, 240, 230))
+    preview = image.resize((16, 8))
+    data = encode_image(image, "MPO", save_all=True, append_images=[preview])
+    picture = read(tmp_path, data)
+    assert picture.lossy and picture.level.shape == (16, 32)
+
+
 def test_ppm_of_16_bits_and_in_ascii_is_read(tmp_path: Path) -> None:
     deep = (COLORS * 257).astype(">u2")
     words = " ".join(map(str, COLORS.ravel().tolist()))

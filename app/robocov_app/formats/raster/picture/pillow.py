@@ -32,6 +32,8 @@ _MAX_JPEG_PIXELS_PER_BYTE = 512
 _WHITE_IS_ZERO = 0
 """Value of the TIFF tag PhotometricInterpretation if 0 is white (TIFF 6.0, section 3)."""
 _MAX_16_BIT_LEVEL = 65535
+_LOSSY_FORMATS = ("JPEG", "MPO")
+"""Pillow's names of JPEGs. A JPEG with several pictures, as many cameras write them, is an MPO."""
 _MODES_WITH_ALPHA = ("LA", "PA", "RGBA", "La", "RGBa")
 
 
@@ -128,7 +130,7 @@ def _convert(image: Image, key: ColorKey) -> Brightness:
     import PIL.ImageOps
     from PIL.ExifTags import Base
 
-    is_lossy = image.format == "JPEG"
+    is_lossy = image.format in _LOSSY_FORMATS
     tiff_tags = getattr(image, "tag_v2", {})
     image.load()
     if image.getexif().get(Base.Orientation, 1) != 1:
