@@ -133,6 +133,16 @@ def test_missed_goals_are_described_with_numbers(changes, missed):
         assert goals[name].verdict == "does not hold"
 
 
+def test_a_comparison_counts_only_the_runs_that_both_contenders_have():
+    outcomes = build_outcomes()
+    outcomes.values[LLOYD.key, "final"][4:] = np.nan
+    goals = judge_all_goals(outcomes)
+    assert (goals["gap"].runs, goals["gap"].maps) == (24, 12)
+    comparison = goals["not-worse-lloyd"]
+    assert (comparison.runs, comparison.maps) == (4, 2)
+    assert comparison.verdict == "undecided"
+
+
 def test_slow_steps_miss_their_goals():
     goals = judge_all_goals(build_outcomes(), build_step_times(ratio=12.0, real_time_factor=1.5))
     assert describe_goal(goals["step"]) == "missed: 12 instead of at most 10"

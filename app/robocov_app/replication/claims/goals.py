@@ -131,11 +131,11 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
     for other in select_strongest(contenders):
         pairs = outcomes.compare(key, other.key)
         if pairs is not None:
-            goals.append(_judge_comparison(pairs, own, other, finished))
+            goals.append(_judge_comparison(pairs, own, other))
     return goals
 
 
-def _judge_comparison(pairs: PairedComparison, own: Contender, other: Contender, finished: Outcomes) -> Claim:
+def _judge_comparison(pairs: PairedComparison, own: Contender, other: Contender) -> Claim:
     """Judge whether a contender is not much worse than another one on any map."""
     own_medians = pairs.outcomes.compute_medians_by_map(own.key, "final")
     other_medians = pairs.outcomes.compute_medians_by_map(other.key, "final")
@@ -150,7 +150,7 @@ def _judge_comparison(pairs: PairedComparison, own: Contender, other: Contender,
             high=NEVER_WORSE,
         ),
         _describe_highest(ratios, NEVER_WORSE),
-        finished,
+        pairs.outcomes,
     )
 
 
