@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,32 @@ def test_a_curve_of_a_fast_run_has_no_gaps(tmp_path: Path) -> None:
         assert curve.times[0] == 0.0
         assert curve.times[-1] == pytest.approx(6.0)
         assert np.diff(curve.times).max() < 0.5
+
+
+def test_a_curve_without_a_cost_at_its_start_has_no_gaps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_viewer(tmp_path, lattice=LATTICE) as driver:
+        (pane,) = driver.session.timeline.panes
+        costs = driver.viewer.costs
+        collect_answers = costs.poll
+
+        def drop_first_cost(known_cost: KnownCost) -> KnownCost:
+            if known_cost.time > 0.0:
+                return known_cost
+            return replace(known_cost, result=replace(known_cost.result, mean_distance=np.nan))
+
+        monkeypatch.setattr(
+            costs, "poll", lambda: [(number, drop_first_cost(cost)) for number, cost in collect_answers()]
+        )
+        pane.distance_curve.__init__()
+        run_fast(driver, 1.0)
+        driver.run_frames(2, seconds=0.0)
+        run_fast(driver, 6.0)
+        driver.run_frames(60, seconds=0.0)
+        times = pane.distance_curve.times
+        assert times[0] > 0.0
+        assert np.diff(times).max() < 0.5
 
 
 def test_an_empty_chart_says_what_it_waits_for(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -141,14 +141,16 @@ class CostCurves:
     def _find_missing_state(self, pane: Pane) -> _MissingState | None:
         """Return the next state whose cost the curve of a pane lacks; None if the curve is complete.
 
-        The first one is the start, so that every curve begins at time 0. The others halve the longest gaps.
+        The first one is the start, unless its cost is not finite, so that the curve begins at time 0. The
+        others halve the longest gaps.
         """
         curve = pane.distance_curve
         if curve.first_time > TIME_TOLERANCE_S:
             state = self._get_state(pane.number, 0.0)
-            # The cost of the displayed step is requested anyway.
-            is_requested = state is not None and state.time == self._viewer.session.displayed.time
-            return None if is_requested else state
+            if state is not None:
+                # The cost of the displayed step is requested anyway.
+                is_requested = state.time == self._viewer.session.displayed.time
+                return None if is_requested else state
         min_length = max(MAX_GAP_S, MAX_GAP_FRACTION * curve.last_time)
         for start, end in curve.list_gaps(min_length):
             state = self._get_state(pane.number, 0.5 * (start + end))
