@@ -94,6 +94,14 @@ def test_branches_without_a_name_are_not_found_by_an_empty_name() -> None:
         document.find_branch("")
 
 
+def test_a_branch_whose_name_is_the_number_of_another_one_is_found_by_its_name() -> None:
+    document = build_branched_session().timeline.document
+    first, *_, last = document.list_branches()
+    assert document.find_branch("1").node is first.node
+    last.node.name = "1"
+    assert document.find_branch("1").node is last.node
+
+
 @pytest.mark.slow
 def test_each_branch_is_saved_in_its_own_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = save_session_file(build_branched_session(), tmp_path)

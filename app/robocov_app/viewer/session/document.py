@@ -248,7 +248,7 @@ class SessionDocument:
         return controllers
 
     def find_branch(self, name: str) -> Branch:
-        """Return the branch with a given name, or with a given number as a string, counted from 1.
+        """Return the branch with a given name or, if there is none, with this number, counted from 1.
 
         Raises
         ------
@@ -256,9 +256,12 @@ class SessionDocument:
             If there is no such branch.
         """
         branches = self.list_branches()
-        for number, branch in enumerate(branches, 1):
+        for branch in branches:
             # The name of a branch is empty if it has none.
-            if name and name in (branch.node.name, str(number)):
+            if name and name == branch.node.name:
+                return branch
+        for number, branch in enumerate(branches, 1):
+            if name == str(number):
                 return branch
         known = ", ".join(f"{number} ({branch.description})" for number, branch in enumerate(branches, 1))
         raise ParameterError(f"branch: expected one of {known}, got {name!r}")
