@@ -277,6 +277,16 @@ def test_unsupported_entities_are_counted(tmp_path: Path) -> None:
     )
 
 
+def test_obstacles_are_named_after_their_layers(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        space.add_circle((3, 3), 0.5, dxfattribs={"layer": "columns"})
+        space.add_line((6, 6), (8, 6), dxfattribs={"layer": "partitions"})
+        space.add_point((5, 5), dxfattribs={"layer": "posts"})
+
+    obstacles = read_drawing(tmp_path, draw, pillar=0.2).primitives
+    assert [obstacle.name for obstacle in obstacles] == ["columns", "partitions", "posts"]
+
+
 def test_multilines_are_their_lines(tmp_path: Path) -> None:
     def draw(document: Any, space: Any) -> None:
         line = space.add_mline([(5, 2), (9, 2)])

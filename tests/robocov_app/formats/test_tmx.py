@@ -183,6 +183,16 @@ def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
     assert foreign.cell is None
 
 
+def test_obstacles_have_the_names_of_their_objects(tmp_path: Path) -> None:
+    given = (
+        '<object name="column" x="40" y="32" width="8" height="8"><ellipse/></object>',
+        '<object name="fence" x="56" y="4"><polyline points="0,0 0,16"/></object>',
+        '<object name="post" x="8" y="24"><point/></object>',
+    )
+    foreign = read(tmp_path, build_objects("things", *given), scale=1.0, thickness=2.0, pillar=1.0)
+    assert [obstacle.name for obstacle in foreign.primitives] == ["column", "fence", "post"]
+
+
 def test_objects_next_to_tiles_are_solid_only_if_declared(tmp_path: Path) -> None:
     square = '<object name="{}" x="0" y="0" width="16" height="16"/>'
     things = build_objects(

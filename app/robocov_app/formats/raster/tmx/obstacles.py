@@ -207,7 +207,7 @@ class ObstacleReader:
             radius = float(np.hypot(*(points[1] - points[0])))
             shapes.add_circle(points[0], radius, labels, location=location)
         elif shape.kind == "point":
-            shapes.add_point(points[0], location=location)
+            shapes.add_point(points[0], labels, location=location)
         else:
             is_polygon = shape.kind == "polygon"
             if not is_polygon or not shapes.add_outline([points], labels, location=location, kind=""):

@@ -152,7 +152,7 @@ class EntityReader:
 
     def _add_point(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         (point,) = self._to_meters([entity.dxf.location])
-        self._shapes.add_point(point, location=location)
+        self._shapes.add_point(point, labels, location=location)
 
     def _add_segment(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         self._add_line(self._to_meters([entity.dxf.start, entity.dxf.end]), labels, location)
