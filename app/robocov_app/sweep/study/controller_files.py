@@ -67,8 +67,8 @@ def read_controller_source(name: str, folder: Path) -> ControllerSource | None:
     try:
         return source._replace(modules=find_own_modules(source.text))
     except SyntaxError as error:
-        place = source.path if error.lineno is None else f"{source.path}:{error.lineno}"
-        raise ParameterError(f"{quote(name)}: {place}: not Python code: {error.msg}") from None
+        location = source.path if error.lineno is None else f"{source.path}:{error.lineno}"
+        raise ParameterError(f"{quote(name)}: {location}: not Python code: {error.msg}") from None
     except ValueError as error:
         raise ParameterError(f"{quote(name)}: {source.path}: not Python code: {error}") from None
     finally:

@@ -42,7 +42,7 @@ SUFFIXES = (".robocov", ".json")
 ANIMATION_S = 30.0
 """Time after the last event for which the examples move."""
 ANIMATION_FPS = 10.0
-"""Pictures per second of the examples."""
+"""Frames per second of the examples."""
 STILL_TIME_S = 3.0
 """Time of the examples with reduced motion, at which the robots have left their starts."""
 
@@ -146,7 +146,9 @@ class StartPage(BaseWindow):
             Command("right", "Right", group, partial(self.focus.move, 1, 0), ("right",), repeats=True),
             Command("up", "Up", group, partial(self.focus.move, 0, -1), ("up",), repeats=True),
             Command("down", "Down", group, partial(self.focus.move, 0, 1), ("down",), repeats=True),
-            Command("open", "Open the highlighted one", group, self.focus.open, ("return", "space", "enter")),
+            Command(
+                "open", "Open the highlighted item", group, self.focus.open, ("return", "space", "enter")
+            ),
             Command("file", "Open a file", group, self.open_dialog, ("ctrl+o",)),
             Command("theme", "Light or dark", group, self.toggle_theme, ("t",)),
             Command("help", "Keys", group, self.toggle_help, ("f1",)),

@@ -120,7 +120,7 @@ def _parse_page_length(attributes: dict[str, str], name: str, whole: float) -> f
 
 
 class _DrawingReader:
-    """Visits the elements, including uses and nested images, in the order in which they are drawn."""
+    """Visits the elements, including uses and nested drawings, in the order in which they are drawn."""
 
     def __init__(self, root: Element, shapes: Shapes) -> None:
         """Collect the style sheets of the drawing, and its elements by id."""
@@ -198,7 +198,7 @@ class _DrawingReader:
             self._draw_element(child, child_state)
 
     def _enter_group(self, element: Element, state: ElementState) -> Iterator[tuple[Element, ElementState]]:
-        """Yield the elements that a group, an image or a ``use`` draws, each with the state around it.
+        """Yield the elements in a group, a nested drawing or a ``use``, each with the state around it.
 
         Raises
         ------
