@@ -292,3 +292,11 @@ def test_a_rejected_command_stays_for_correction(tmp_path: Path) -> None:
     with open_editor(tmp_path) as driver:
         driver.run_command("grid 99999")
         assert "99999" in open_palette(driver).error and open_palette(driver).text == "grid 99999"
+
+
+def test_a_negative_seed_is_rejected(tmp_path: Path) -> None:
+    with open_editor(tmp_path) as driver:
+        driver.run_command("seed 5")
+        driver.run_command("seed -3")
+        assert open_palette(driver).error == "seed: expected a whole number of at least 0, got -3"
+        assert driver.editor.seed == 5

@@ -117,7 +117,9 @@ def _set_robots(editor: Editor, text: str) -> None:
 
 
 def _set_seed(editor: Editor, text: str) -> None:
-    editor.seed = max(_parse_int("seed", text), 0)
+    seed = _parse_int("seed", text)
+    require(seed >= 0, f"seed: expected a whole number of at least 0, got {seed}")
+    editor.seed = seed
 
 
 def _apply_edit(edit: Edit, parse: Callable[[str], object]) -> TypedAction:
