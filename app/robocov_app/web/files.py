@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
@@ -86,7 +87,8 @@ class Upload:
         """Write the file under an unused name, and return its path; raise `TransferError` on failure."""
         path = folder / self.name
         try:
-            if path.exists():
+            # A broken symbolic link also counts as an existing file, as in `find_free_path`.
+            if os.path.lexists(path):
                 path = find_free_path(folder, path.stem, path.suffix)
             with replace_file(path) as temporary:
                 temporary.write_bytes(b"".join(self._pieces))

@@ -15,7 +15,7 @@ import pygame
 import pytest
 
 from robocov_app.web.events import MAX_UPLOAD_BYTES, PointerMoved, Uploaded
-from robocov_app.web.files import read_saved
+from robocov_app.web.files import Upload, read_saved
 
 pytest.importorskip("websockets")
 
@@ -101,6 +101,17 @@ def test_only_the_controlling_page_downloads_an_offered_file(display, folder, te
 
 
 # Uploads
+
+
+def test_an_upload_with_the_name_of_a_broken_link_gets_another_name(tmp_path):
+    link = tmp_path / "plan.json"
+    link.symlink_to(tmp_path / "gone" / "plan.json")
+    upload = Upload("plan.json", 2, is_rejected=False)
+    upload.add(b"{}")
+    path = upload.save(tmp_path)
+    assert (path.name, path.read_bytes()) == ("plan-1.json", b"{}")
+    assert link.is_symlink()
+
 
 INVALID_NAMES = [
     "../out.json",
