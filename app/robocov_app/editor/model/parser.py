@@ -164,7 +164,7 @@ class _Reader:
     """
 
     def __init__(self, source_name: str) -> None:
-        self._where = source_name
+        self._source_name = source_name
         # How to read the fields of obstacles, starts and paths, by their names.
         self._readers: dict[str, Callable[[Any, JsonPath], Any]] = {
             "center": self.read_point,
@@ -187,7 +187,7 @@ class _Reader:
             named_path = path[:-1]
         if named_path:
             message = f"{format_path(named_path)}: {message}"
-        raise MapError.from_issues(self._where, [Issue(path, message, at_key)])
+        raise MapError.from_issues(self._source_name, [Issue(path, message, at_key)])
 
     def require_type(self, kind: type[_Value], value: Any, path: JsonPath, expected: str) -> _Value:
         """Return a value unchanged; raise MapError unless it has the given type."""

@@ -24,7 +24,7 @@ class LabelFilter:
         if options.only is not None:
             self.only = set(map(str.casefold, options.only))
         self.skip = set(map(str.casefold, options.skip or ()))
-        self._where = source_name
+        self._source_name = source_name
         self._options = options
         self._known: dict[str, str] = {}
 
@@ -49,7 +49,7 @@ class LabelFilter:
         for option, names in given.items():
             for name in names:
                 if name.casefold() not in self._known:
-                    raise ParameterError(f"{self._where}: {option}: {self._describe_unknown(name)}")
+                    raise ParameterError(f"{self._source_name}: {option}: {self._describe_unknown(name)}")
 
     def _describe_unknown(self, name: str) -> str:
         known = list(self._known.values())[:_MAX_LISTED_NAMES]

@@ -37,7 +37,7 @@ class _EntityCounter:
 
     def __init__(self, document: Any, source_name: str) -> None:
         self._document = document
-        self._where = source_name
+        self._source_name = source_name
         self._counts: dict[str, int] = {}
         self._open_blocks: list[str] = []
 
@@ -52,9 +52,9 @@ class _EntityCounter:
         """Return the number of entities that an insert of a block adds, at all of its positions."""
         name = str(insert.dxf.get("name", "")).casefold()
         if name in self._open_blocks:
-            raise MapError(f"{self._where}: block {quote(name)} is inserted into itself")
+            raise MapError(f"{self._source_name}: block {quote(name)} is inserted into itself")
         if len(self._open_blocks) >= files.MAX_DEPTH:
-            raise MapError(f"{self._where}: blocks are nested deeper than {files.MAX_DEPTH}")
+            raise MapError(f"{self._source_name}: blocks are nested deeper than {files.MAX_DEPTH}")
         if name not in self._counts:
             block = self._document.blocks.get(name)
             self._open_blocks.append(name)

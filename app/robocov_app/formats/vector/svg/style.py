@@ -81,7 +81,7 @@ class StyleSheet:
 
     def __init__(self, source_name: str) -> None:
         self.unsupported_count = 0
-        self._where = source_name
+        self._source_name = source_name
         self._rules_by_name: dict[str, list[_StyleRule]] = {}
         self._rule_count = 0
         self._characters = 0
@@ -92,7 +92,7 @@ class StyleSheet:
         self._characters += len(text)
         if self._characters > MAX_SHEET_CHARACTERS:
             expected = f"expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
-            raise MapError(f"{self._where}: {expected}, got more")
+            raise MapError(f"{self._source_name}: {expected}, got more")
         text = text.replace("<!--", " ").replace("-->", " ")
         # Comments are removed only up to the last "*/", because searching for a missing end takes forever.
         commented, end, rest = text.rpartition("*/")
@@ -117,7 +117,7 @@ class StyleSheet:
         candidates = [rule for name in ("", *names) for rule in self._rules_by_name.get(name, ())]
         self._checks += len(candidates)
         if self._checks > MAX_RULE_CHECKS:
-            raise MapError(f"{self._where}: too many rules for too many elements")
+            raise MapError(f"{self._source_name}: too many rules for too many elements")
         rules = [rule for rule in candidates if rule.required_names <= names]
         rules.sort(key=lambda rule: rule.specificity)
         declarations = [rule.declarations for rule in rules]

@@ -31,7 +31,7 @@ class Scanner:
     def __init__(self, text: str, source_name: str) -> None:
         self.text = text
         self.position = 0
-        self._where = source_name
+        self._source_name = source_name
 
     def skip_space(self) -> None:
         """Move past white space."""
@@ -80,4 +80,4 @@ class Scanner:
         if position is None:
             position = self.position
         line, column = find_line_and_column(self.text, position)
-        raise MapError(f"{self._where}:{line}:{column}: {problem}")
+        raise MapError(f"{self._source_name}:{line}:{column}: {problem}")
