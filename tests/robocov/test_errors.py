@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.metadata import EntryPoint
+from itertools import count
 
 import pytest
 
@@ -141,7 +142,7 @@ STILL = rc.Simulation(ROOMS, rc.Rapf(), ONE).run(0.0)
             "start 'corridor': robots: expected a whole number of at least 1, got 0",
         ),
     ],
-    ids=range(18),
+    ids=count(),
 )  # fmt: skip
 def test_issues_in_python_name_the_argument_and_what_was_expected(
     call: Callable[[], object], message: str
