@@ -304,7 +304,8 @@ def quote_json(value: object) -> str:
     Parameters
     ----------
     value : object
-        The value to show. Parts that JSON cannot represent appear as their `repr`.
+        The value to show. Parts that JSON cannot represent are formatted by `quote`, as is the whole value if
+        it has such keys or contains itself.
 
     Returns
     -------
@@ -315,7 +316,10 @@ def quote_json(value: object) -> str:
     >>> quote_json({"radius": None})
     '{"radius": null}'
     """
-    return _shorten(json.dumps(value, default=repr))
+    try:
+        return _shorten(_format_json(value))
+    except (TypeError, ValueError, RecursionError):
+        return quote(value)
 
 
 def to_one_line(text: object) -> str:
@@ -376,13 +380,21 @@ def format_path(path: Sequence[str | int]) -> str:
         if isinstance(name, str) and _is_plain_key(name):
             text += f".{name}" if text else name
         else:
-            text += f"[{json.dumps(name)}]"
+            text += f"[{_format_json(name)}]"
     return text
 
 
 def _is_plain_key(name: str) -> bool:
     """Return whether a key needs no quotes in a path."""
     return name.replace("-", "_").replace("$", "_").isidentifier()
+
+
+def _format_json(value: object) -> str:
+    """Format a value as JSON on one line, with escapes only for characters that are not printable."""
+    text = json.dumps(value, default=quote, ensure_ascii=False)
+    if text.isprintable():
+        return text
+    return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in text)
 
 
 def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:

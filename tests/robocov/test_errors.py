@@ -70,6 +70,26 @@ def test_long_values_are_cut_in_messages() -> None:
     assert len(errors.quote("x" * 1000)) == 60
 
 
+def test_json_in_messages_keeps_its_letters_and_escapes_control_characters() -> None:
+    assert errors.quote_json({"größe": "Φ"}) == '{"größe": "Φ"}'
+    assert format_path(("starts", "große Halle")) == 'starts["große Halle"]'
+    assert errors.quote_json("a\nb\u202ec\ud800") == r'"a\nb\u202ec\ud800"'
+    assert format_path(("extra", "a b\u202e")) == r'extra["a b\u202e"]'
+
+
+def test_values_that_are_not_json_are_described_in_messages() -> None:
+    class Unprintable:
+        def __repr__(self) -> str:
+            raise RuntimeError
+
+    cyclic: list[object] = [1]
+    cyclic.append(cyclic)
+    assert errors.quote_json(cyclic) == "[1, [...]]"
+    assert errors.quote_json({(1, 2): 3}) == "{(1, 2): 3}"
+    assert errors.quote_json(10**5000) == "<int>"
+    assert errors.quote_json([Unprintable()]) == '["<Unprintable>"]'
+
+
 def test_messages_about_strange_names_are_readable() -> None:
     message = errors.describe_unknown_name("controller", "x" * 1000, ["x" * 2000, "rapf"])
     assert len(message) < 250
