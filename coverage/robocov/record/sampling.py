@@ -10,7 +10,7 @@ from robocov.typing import FloatArray, IntArray
 TIME_ROUNDING_S = 5e-7
 """Maximum difference between times that is attributed to rounding: times are sums of control periods."""
 _TIE_DECIMALS = 6
-"""Number of decimals, in periods, to which distances are compared; further decimals are rounding errors."""
+"""Number of decimals, in periods, of the midpoints between steps; further decimals are rounding errors."""
 
 
 def require_rate(rate: float) -> None:
@@ -43,7 +43,7 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     -------
     (K,) int array
         Indices of the selected time steps, ascending. Of two steps that are equally near to a multiple, the
-        earlier one is selected. If the rate is at least that of the steps, all steps are selected.
+        earlier one is selected. If all intervals between steps are at least 1/rate, all steps are selected.
 
     Raises
     ------
@@ -60,12 +60,9 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     min_step = float(np.diff(time).min(initial=np.inf))
     if min_step * rate >= 1.0:
         return np.arange(last + 1)
-    # Sort the steps by their nearest multiple of the period, and then by their distance from that multiple.
-    # The first step of each multiple is then the step nearest to it.
     periods = (time - time[0]) * rate
-    nearest_multiple = np.rint(periods)
-    deviation = np.round(np.abs(periods - nearest_multiple), _TIE_DECIMALS)
-    order = np.lexsort([deviation, nearest_multiple])
-    is_first_of_multiple = np.diff(nearest_multiple[order], prepend=-1.0) > 0.0
-    nearest = order[np.flatnonzero(is_first_of_multiple)]
-    return np.union1d(nearest, [0, last])
+    midpoints = np.round((periods[:-1] + periods[1:]) / 2.0, _TIE_DECIMALS)
+    # A step is nearest to the multiples above the midpoint before it, up to the midpoint after it.
+    last_multiples = np.floor(midpoints)
+    is_nearest = np.diff(last_multiples, prepend=-1.0) > 0.0
+    return np.union1d(np.flatnonzero(is_nearest), [0, last])

@@ -10,23 +10,35 @@ from hypothesis import strategies as st
 from robocov.errors import ParameterError
 from robocov.record import select_nearest_steps
 
+UNIFORM_INTERVALS = st.builds(lambda dt, count: [dt] * count, st.floats(1e-3, 0.5), st.integers(0, 300))
+IRREGULAR_INTERVALS = st.lists(st.floats(1e-3, 0.5), max_size=100)
 
-@given(st.integers(1, 300), st.floats(1e-3, 0.5), st.floats(0.0, 60.0), st.sampled_from([0.0, 12.5]))
-def test_the_nearest_to_every_multiple_stays(count, dt, rate, begin) -> None:
+
+@given(UNIFORM_INTERVALS | IRREGULAR_INTERVALS, st.floats(0.0, 60.0), st.sampled_from([0.0, 12.5]))
+def test_the_step_nearest_to_each_multiple_is_selected(intervals, rate, start) -> None:
     """Each multiple selects its nearest step; it is not each step that selects its nearest multiple."""
-    time = begin + np.arange(count) * dt
-    kept = select_nearest_steps(time, rate)
-    assert kept[0] == 0 and kept[-1] == count - 1
-    assert (np.diff(kept) > 0).all()
-    if dt * rate >= 1.0:
-        assert len(kept) == count
-    multiples = begin + np.arange(np.floor((count - 1) * dt * rate + 1e-9) + 1) / max(rate, 1e-9)
-    away = np.abs(time[:, None] - multiples[None])
-    assert np.abs(time[kept][:, None] - multiples[None]).min(axis=0) == pytest.approx(
-        away.min(axis=0), abs=1e-6 / max(rate, 1e-3)
-    )
-    # and no more than those
-    assert len(kept) <= len(multiples) + 1
+    time = start + np.cumsum([0.0, *intervals])
+    selected = select_nearest_steps(time, rate)
+    assert selected[0] == 0
+    assert selected[-1] == len(time) - 1
+    assert (np.diff(selected) > 0).all()
+    if min(intervals, default=np.inf) * rate >= 1.0 + 1e-9:
+        assert len(selected) == len(time)
+    multiple_count = int((time[-1] - start) * rate + 1e-9) + 1
+    multiples = start + np.arange(multiple_count) / max(rate, 1e-9)
+    distances = np.abs(time[:, None] - multiples)
+    expected = pytest.approx(distances.min(axis=0), abs=1e-6 / max(rate, 1e-3))
+    assert distances[selected].min(axis=0) == expected
+    # No other steps are selected, except the first and the last.
+    assert len(selected) <= multiple_count + 1
+
+
+def test_a_record_that_was_thinned_before_is_thinned_correctly() -> None:
+    """The intervals of its steps differ, and its last step may be close to the one before."""
+    time = np.arange(1811) / 60.0
+    time = time[select_nearest_steps(time, 7.0)]
+    assert np.diff(time)[-1] < 0.1 < np.diff(time)[:-1].min()
+    assert len(select_nearest_steps(time, 10.0)) == len(time)
 
 
 @pytest.mark.parametrize("rate", [-1.0, np.nan, np.inf, "fast", None])
