@@ -107,7 +107,7 @@ class Ascent:
         Returns
         -------
         Ascent
-            The updated ascent; the same object if nothing changes.
+            The updated ascent.
         """
         ascent = self
         if math.dist(position, self.rest_position) > _REST_RADIUS_M:

@@ -115,9 +115,9 @@ def test_only_working_robots_count_in_the_coverage_cost() -> None:
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(0.5)
     cost = CoverageCost(HALL, 32)
     history = compute_cost_history(record, cost, 60.0)
-    for moment in (0, 10, 20, 30):
-        working_positions = record.positions[moment][record.is_working[moment]]
-        assert history.mean_distance[moment] == cost(working_positions).mean_distance
+    for step in (0, 10, 20, 30):
+        working_positions = record.positions[step][record.is_working[step]]
+        assert history.mean_distance[step] == cost(working_positions).mean_distance
     assert record.is_working[0].tolist() == [True, True, False, True]
     assert record.is_working[-1].tolist() == [False, False, True, True]
     assert record.is_present[0].tolist() == [True, True, False, True]

@@ -135,7 +135,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured as Linux tells it")
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured by /proc")
 def test_hostile_rasters_are_rejected(tmp_path: Path) -> None:
     files: list[tuple[Path, float | None]] = []
     for name, (file, content, options, _) in HOSTILE.items():
