@@ -64,7 +64,7 @@ def draw_large_plans(theme: str) -> None:
 
 
 def draw_new_families(theme: str) -> None:
-    """Draw the first map of each family that no rule of a controller was fitted to, in a theme."""
+    """Draw the first map of each of the five kinds that are not in the benchmark, in a theme."""
     script = runpy.run_path(str(NEW_FAMILIES))
     maps = [script["build_map"](family, script["SEEDS"][0]) for family in script["FAMILIES"]]
     draw_maps("new-families", maps, theme)

@@ -1,4 +1,4 @@
-"""Gaps of controllers on five families of maps that no rule of a controller was fitted to.
+"""Gaps of controllers on five families of maps that are not in the benchmark.
 
     python tests/bench/bench_new_families.py --out new-families
     python tests/bench/bench_new_families.py --maps map-files
