@@ -1,11 +1,11 @@
 """Reference placements and certified lower bounds for the maps of the suite, which its file contains."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,25 +29,33 @@ _POSITION_DIGITS = 4
 """Number of decimal places of positions in meters."""
 
 
-def list_references() -> Iterator[tuple[str, int, float]]:
-    """Yield the map, team size and time of every reference placement of the suite.
+class ReferenceSetting(NamedTuple):
+    """Setting of a reference placement of the suite."""
 
-    Yields
-    ------
-    name : str
-        Name of the map.
-    robots : int
-        Number of robots.
-    time : float, s
-        Time that determines the positions of moving obstacles: the end of the runs.
+    map_name: str
+    robots: int
+    """Number of robots."""
+    radius: float
+    """Radius of a robot, m."""
+    time: float
+    """Time that determines the positions of moving obstacles: the end of the runs, s."""
+
+
+def list_references() -> list[ReferenceSetting]:
+    """List the settings of all reference placements of the suite.
+
+    Returns
+    -------
+    list of ReferenceSetting
+        One for each map and number of robots.
     """
-    times: dict[tuple[str, int], float] = {}
+    settings: dict[tuple[str, int], ReferenceSetting] = {}
     for track in suite.TRACKS.values():
         sizes = range(track.survivors, track.robots + 1)
         for name, robots in product(track.maps, sizes):
-            times.setdefault((name, robots), track.duration)
-    for (name, robots), time in times.items():
-        yield name, robots, time
+            setting = ReferenceSetting(name, robots, radius=track.radius, time=track.duration)
+            settings.setdefault((name, robots), setting)
+    return list(settings.values())
 
 
 @dataclass(frozen=True)
@@ -56,13 +64,13 @@ class _ReferenceSlot:
 
     references: dict[str, Any]
     """References of the map by team size, to which the answers are added."""
-    robots: int
+    setting: ReferenceSetting
     environment: Environment
 
     @property
     def reference(self) -> dict[str, Any]:
         """The stored reference; empty if there is none yet."""
-        return self.references.get(str(self.robots), {})  # type: ignore[no-any-return]
+        return self.references.get(str(self.setting.robots), {})  # type: ignore[no-any-return]
 
 
 def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interruption) -> tuple[int, int]:
@@ -88,10 +96,11 @@ def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interrupt
         Number of references and bounds that the file contains, and number of those that it still lacks.
     """
     maps = _load_maps(path)
-    slots = {
-        f"{name} {robots}": _ReferenceSlot(maps[name]["references"], robots, suite.build_map(name).at(time))
-        for name, robots, time in list_references()
-    }
+    slots = {}
+    for setting in list_references():
+        environment = suite.build_map(setting.map_name).at(setting.time)
+        slot = _ReferenceSlot(maps[setting.map_name]["references"], setting, environment)
+        slots[f"{setting.map_name} {setting.robots}"] = slot
     missing_references = [key for key, slot in slots.items() if not slot.reference]
     missing_bounds = [key for key, slot in slots.items() if slot.reference.get("lower_bound_m") is None]
     total = len(missing_references) + len(missing_bounds)
@@ -122,8 +131,8 @@ def _search_references(
     queries = {
         key: ReferenceQuery(
             to_json(slot.environment),
-            slot.robots,
-            radius=suite.ROBOT_RADIUS_M,
+            slot.setting.robots,
+            radius=slot.setting.radius,
             lattice=suite.LATTICE,
             restarts=RESTARTS,
             seed=SEED,
@@ -131,15 +140,16 @@ def _search_references(
         for key, slot in slots.items()
     }
     for key, answer in answer_queries(queries, workers, stop):
-        slots[key].references[str(slots[key].robots)] = _build_reference(slots[key].environment, answer)
+        slot = slots[key]
+        slot.references[str(slot.setting.robots)] = _build_reference(slot, answer)
         report_answer()
 
 
-def _build_reference(environment: Environment, placement: ReferencePlacement) -> dict[str, Any]:
+def _build_reference(slot: _ReferenceSlot, placement: ReferencePlacement) -> dict[str, Any]:
     """Build the entry of a reference placement in the suite's file, still without a lower bound."""
     # The cost is computed at the rounded positions, so that it can be recomputed from the file.
     positions = np.round(placement.positions, _POSITION_DIGITS)
-    cost = CoverageCost(environment, suite.LATTICE, radius=suite.ROBOT_RADIUS_M)
+    cost = CoverageCost(slot.environment, suite.LATTICE, radius=slot.setting.radius)
     result = cost(positions)
     return {
         "mean_distance_m": result.mean_distance,
@@ -156,10 +166,24 @@ def _compute_bounds(
     """Compute the lower bounds of slots; add each to the reference in its slot, and report it."""
     if not slots:
         return
-    queries = {key: (to_json(slot.environment), slot.reference["positions_m"]) for key, slot in slots.items()}
+    queries = {
+        key: BoundQuery(to_json(slot.environment), slot.reference["positions_m"], slot.setting.radius)
+        for key, slot in slots.items()
+    }
     for key, bound in answer_queries(queries, workers, stop, f"{__name__}:LowerBoundService"):
         slots[key].reference["lower_bound_m"] = bound
         report_answer()
+
+
+class BoundQuery(NamedTuple):
+    """Inputs of a lower bound."""
+
+    document: Mapping[str, Any]
+    """The map as JSON."""
+    positions: Sequence[Sequence[float]]
+    """Positions of the best known placement, m."""
+    radius: float
+    """Radius of a robot, m."""
 
 
 class LowerBoundService:
@@ -167,18 +191,15 @@ class LowerBoundService:
 
     failure_message = "the bound failed"
 
-    def __call__(self, requests: list[tuple[dict[str, Any], list[list[float]]]], channel: Channel) -> float:
-        """Return a lower bound for the mean distance of all placements, m, which may take minutes.
-
-        The last request contains the map as JSON, and the positions of the best known placement.
-        """
+    def __call__(self, requests: list[BoundQuery], channel: Channel) -> float:
+        """Return a lower bound for the mean distance of all placements, m, which may take minutes."""
         from robocov.lower_bound import compute_lower_bound
 
-        document, positions = requests[-1]
+        query = requests[-1]
         bound = compute_lower_bound(
-            from_json(document),
-            np.array(positions),
-            radius=suite.ROBOT_RADIUS_M,
+            from_json(dict(query.document)),
+            np.array(query.positions),
+            radius=query.radius,
             lattice=suite.LATTICE,
             precision=BOUND_PRECISION,
         )
@@ -203,7 +224,7 @@ def _save_maps(path: Path, maps: Mapping[str, Any]) -> None:
         "lattice": suite.LATTICE,
         "restarts": RESTARTS,
         "seed": SEED,
-        "radius_m": suite.ROBOT_RADIUS_M,
+        "radius_m": {name: track.radius for name, track in suite.TRACKS.items()},
         "precision": BOUND_PRECISION,
     }
     lines = []

@@ -294,19 +294,20 @@ def _is_bound_constant(row: Row) -> bool:
 
 def _check_clearance(row: Row, location: str) -> None:
     """Raise InputError if the minimum clearance from walls contradicts the contacts of a row."""
+    track = suite.TRACKS[row["track"]]
     clearance = row["min_clearance_m"]
     if clearance is None:
         return
-    if clearance < -suite.ROBOT_RADIUS_M:
+    if clearance < -track.radius:
         raise InputError(
-            f"{location}: min_clearance_m: expected at least {-suite.ROBOT_RADIUS_M}, got {clearance}. "
+            f"{location}: min_clearance_m: expected at least {-track.radius}, got {clearance}. "
             "The distance of a robot's center from a wall cannot be negative"
         )
     has_contact = clearance <= MAX_CONTACT_GAP_M
     if has_contact and not row["contacts"]:
         raise InputError(f"{location}: contacts: expected at least 1 for a clearance of {clearance} m, got 0")
     # A single robot can only touch walls.
-    is_alone = suite.TRACKS[row["track"]].robots == 1
+    is_alone = track.robots == 1
     if is_alone and row["contacts"] and not has_contact:
         raise InputError(
             f"{location}: contacts: expected 0 for one robot with a clearance of {clearance} m, "

@@ -19,6 +19,8 @@ from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
 from robocov_app.benchmark.maps.large_plans import LARGE_PLANS, build_large_plan
 from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
+from robocov_app.benchmark.maps.worlds import ROBOTS as WORLD_ROBOTS
+from robocov_app.benchmark.maps.worlds import build_world
 from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.sweep.study.study import Study, StudyMap
 
@@ -29,6 +31,7 @@ SUITE_FILE = Path(__file__).parent / f"suite-{VERSION}.json"
 LATTICE = 128
 """Number of sites along a side of the lattice for all costs and reference placements."""
 ROBOT_RADIUS_M = 0.1
+"""Radius of a robot on most tracks."""
 TEAM_SIZE = 6
 """Number of robots on most tracks."""
 _FIRST_SEED = 7001
@@ -59,6 +62,8 @@ _LARGE_SIDE_M = 20.0
 """Side of maps for large teams."""
 _LARGE_KINDS = ("polygons", "blocks", "rooms", "caves")
 """Generators of maps for large teams."""
+WORLDS = "worlds"
+"""Family of the maps by the rules of CoverageControl, another simulator."""
 
 
 def _list_names(kind: str, count: int, first_seed: int = _FIRST_SEED) -> tuple[str, ...]:
@@ -77,6 +82,7 @@ OTHER_FAMILIES: Mapping[str, tuple[str, ...]] = {
     "moving": ("forklifts", *_list_names("traffic", 5)),
     "large": tuple(f"large-{name}" for kind in _LARGE_KINDS for name in _list_names(kind, 2)),
     **{kind: _list_names(kind, 4) for kind in LARGE_PLANS},
+    WORLDS: _list_names(WORLDS, 4),
     "tuning": tuple(name for kind in _GENERATED_FAMILIES for name in _list_names(kind, 2, first_seed=1)),
 }
 """Maps of the other tracks by family; the tuning maps are for choosing gains and do not count."""
@@ -105,6 +111,8 @@ class Track:
         Number of robots at the start.
     duration : float, s
         Simulated time of a run.
+    radius : float, m
+        Radius of a robot.
     changes : Mapping
         Options of the study that differ from those of the ideal track.
     failures : tuple of (int, float)
@@ -118,6 +126,7 @@ class Track:
     seeds: tuple[int, ...] = (0,)
     robots: int = TEAM_SIZE
     duration: float = DEFAULT_DURATION_S
+    radius: float = ROBOT_RADIUS_M
     changes: Mapping[str, Any] = field(default_factory=dict)
     failures: tuple[tuple[int, float], ...] = ()
     ranking: str = "core"
@@ -150,6 +159,22 @@ TRACKS: Mapping[str, Track] = {
         OTHER_FAMILIES["density"],
         seeds=(0, 1),
         changes={"conditions": {"density": "sensed"}},
+        ranking="",
+    ),
+    "open-square": Track(
+        "an open square of 1024 m with 32 peaks, which robots have to find: the density can only be "
+        "measured; communication range of 128 m, sensing range of 32 m",
+        OTHER_FAMILIES[WORLDS],
+        robots=WORLD_ROBOTS,
+        duration=120.0,
+        radius=1.0,
+        changes={
+            "max_speed": 5.0,
+            "max_acceleration": 10.0,
+            "sensing_range": 32.0,
+            "communication_range": 128.0,
+            "conditions": {"density": "sensed"},
+        },
         ranking="",
     ),
     "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
@@ -236,6 +261,8 @@ def build_map(name: str) -> Environment:
         return generate_map(int(seed), kind=kind, obstacles=_LARGE_OBSTACLES, side=_LARGE_SIDE_M)
     if kind in LARGE_PLANS:
         return build_large_plan(kind, int(seed))
+    if kind == WORLDS:
+        return build_world(int(seed))
     # Bundled maps such as blocks-a are named like generated ones.
     if has_generator(kind) and name not in _BUNDLED:
         return build_family_map(kind, int(seed))
@@ -413,7 +440,7 @@ def build_study(
     options: dict[str, Any] = {
         "robots": (track.robots,),
         "duration": track.duration,
-        "radius": ROBOT_RADIUS_M,
+        "radius": track.radius,
         "lattice": LATTICE,
         "cost_hz": _COST_RATE_HZ,
         "record_hz": 0.0,

@@ -28,6 +28,7 @@ SAMPLED_MAPS = (
     "dense-yards-7001",
     "wards-7001",
     "tunnels-7003",
+    "worlds-7002",
 )
 WALLED = Environment(
     "walled",
@@ -78,14 +79,19 @@ def test_the_suite_is_complete_and_tuning_maps_are_separate() -> None:
     assert all(tuning.isdisjoint(suite.TRACKS[name].maps) for name in suite.TRACKS if name != "tuning")
     families = {**suite.FAMILIES, **suite.OTHER_FAMILIES}
     assert sum(map(len, families.values())) == len(suite.FAMILY_OF), "each map is in one family"
-    for name, robots, _ in list_references():
-        assert len(suite.load_frozen_maps()[name]["references"][str(robots)]["positions_m"]) == robots
+    for setting in list_references():
+        references = suite.load_frozen_maps()[setting.map_name]["references"]
+        assert len(references[str(setting.robots)]["positions_m"]) == setting.robots
 
 
 def test_references_have_the_stated_cost() -> None:
-    for name, robots in (("rooms-7001", "4"), ("dense-yards-7001", "6")):
-        reference = suite.load_frozen_maps()[name]["references"][robots]
-        result = CoverageCost(suite.load_suite_map(name), suite.LATTICE)(np.array(reference["positions_m"]))
+    settings = {(setting.map_name, setting.robots): setting for setting in list_references()}
+    assert settings["worlds-7001", 32].radius == 1.0
+    for name, robots in (("rooms-7001", 4), ("dense-yards-7001", 6), ("worlds-7001", 32)):
+        reference = suite.load_frozen_maps()[name]["references"][str(robots)]
+        radius = settings[name, robots].radius
+        cost = CoverageCost(suite.load_suite_map(name), suite.LATTICE, radius=radius)
+        result = cost(np.array(reference["positions_m"]))
         assert result.mean_distance == pytest.approx(reference["mean_distance_m"], rel=1e-12)
 
 

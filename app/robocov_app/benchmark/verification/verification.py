@@ -596,7 +596,7 @@ def _compute_gaps_on_new_maps(
         new_map.name: ReferenceQuery(
             to_json(new_map.environment),
             robots,
-            radius=suite.ROBOT_RADIUS_M,
+            radius=suite.TRACKS[new_runs.track].radius,
             lattice=suite.LATTICE,
             restarts=RESTARTS,
         )
