@@ -16,33 +16,28 @@ CoverageControl are run by its own library, which has to be installed:
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import math
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from pathlib import Path
-from types import ModuleType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from robocov import Environment, Raster, Simulation, Team, UniformStart, make_controller
+from robocov import ParameterError, Simulation, Team, make_controller
 from robocov.typing import FloatArray
+from robocov_app.benchmark.coverage_control_cvt import build_world_density, load_library
+from robocov_app.benchmark.maps.worlds import (
+    PIXELS,
+    ROBOTS,
+    SIDE_M,
+    build_open_square,
+    draw_world,
+    merge_pixels,
+)
 
-SIDE_M = 1024.0
-PIXELS = 1024
-"""Number of pixels along a side of a world."""
-RASTER_PIXELS = 256
-"""Number of pixels along a side of the density that robots of robocov sense."""
-ROBOTS = 32
-PEAKS = 32
-SIGMA_RANGE_M = (40.0, 50.0)
-MASS_RANGE = (6.0, 10.0)
-TRUNCATION = 2.0
-"""Distance from its center at which a peak ends, in standard deviations."""
 MAX_MEAN_DIFFERENCE = 1e-3
 """Maximum mean difference between the densities of both simulators, which are 1 at most."""
 SENSING_RANGE_M = 32.0
@@ -68,55 +63,6 @@ CLAIRVOYANT_LLOYD_KNOWLEDGE = "the density and all positions"
 HEAD = "| controller | what a robot knows | remaining cost | in each world |\n|---|---|---|---|"
 
 
-class Peak(NamedTuple):
-    """A circular Gaussian, cut off at `TRUNCATION` standard deviations."""
-
-    x: float
-    """m"""
-    y: float
-    """m"""
-    sigma: float
-    """Standard deviation, m."""
-    mass: float
-    """Integral of the density without the cut."""
-
-
-class World(NamedTuple):
-    """A world, and the starts of the robots."""
-
-    peaks: Sequence[Peak]
-    density: FloatArray
-    """(PIXELS, PIXELS) Density by row (y) and column (x), at most 1."""
-    starts: FloatArray
-    """(ROBOTS, 2) m"""
-
-
-def draw_world(seed: int) -> World:
-    """Draw a world by the default rules of CoverageControl."""
-    rng = np.random.default_rng(seed)
-    peaks = []
-    for _ in range(PEAKS):
-        x, y = rng.uniform(0.0, SIDE_M, 2)
-        peaks.append(Peak(x=x, y=y, sigma=rng.uniform(*SIGMA_RANGE_M), mass=rng.uniform(*MASS_RANGE)))
-    starts = rng.uniform(1.0, SIDE_M - 1.0, (ROBOTS, 2))
-    return World(peaks=peaks, density=compute_density(peaks), starts=starts)
-
-
-def compute_density(peaks: Sequence[Peak]) -> FloatArray:
-    """Compute the mass of the peaks in each pixel, relative to the largest, (PIXELS, PIXELS)."""
-    edges = np.linspace(0.0, SIDE_M, PIXELS + 1)
-    centers = 0.5 * (edges[:-1] + edges[1:])
-    density = np.zeros((PIXELS, PIXELS))
-    for peak in peaks:
-        mass_x = np.diff(scipy.special.ndtr((edges - peak.x) / peak.sigma))
-        mass_y = np.diff(scipy.special.ndtr((edges - peak.y) / peak.sigma))
-        squared_distances = (centers - peak.x) ** 2 + (centers[:, None] - peak.y) ** 2
-        is_near = squared_distances <= (TRUNCATION * peak.sigma) ** 2
-        density += np.where(is_near, peak.mass * mass_x * mass_y[:, None], 0.0)
-    relative: FloatArray = density / density.max()
-    return relative
-
-
 def compute_cost(density: FloatArray, positions: FloatArray) -> float:
     """Compute the sum of the squared distances to the nearest robot, weighted by the density."""
     x, y = np.meshgrid(np.arange(PIXELS) + 0.5, np.arange(PIXELS) + 0.5)
@@ -124,15 +70,6 @@ def compute_cost(density: FloatArray, positions: FloatArray) -> float:
     centers = pixel_side * np.column_stack([x.ravel(), y.ravel()])
     distances, _ = scipy.spatial.KDTree(positions).query(centers)
     return float(density.ravel() @ distances**2)
-
-
-def build_environment(world: World) -> Environment:
-    """Build the world as a map of robocov, with a coarser raster that has the same mass in each pixel."""
-    merged = PIXELS // RASTER_PIXELS
-    blocks = world.density.reshape(RASTER_PIXELS, merged, RASTER_PIXELS, merged)
-    raster = Raster(blocks.mean(axis=(1, 3)), extent=(0.0, 0.0, SIDE_M, SIDE_M), interpolation="cells")
-    square = ((0.0, 0.0), (SIDE_M, 0.0), (SIDE_M, SIDE_M), (0.0, SIDE_M))
-    return Environment("world", square, density=raster, starts={"anywhere": UniformStart()})
 
 
 def run_ours(name: str, seed: int, *, duration: float, communication_range: float) -> float:
@@ -146,7 +83,9 @@ def run_ours(name: str, seed: int, *, duration: float, communication_range: floa
         sensing_range=SENSING_RANGE_M,
         communication_range=communication_range,
     )
-    simulation = Simulation(build_environment(world), make_controller(name), world.starts, team)
+    # The raster of the map is coarser, and has the same mass in each pixel.
+    environment = build_open_square("world", merge_pixels(world.density))
+    simulation = Simulation(environment, make_controller(name), world.starts, team)
     while simulation.time < duration:
         simulation.step()
     return compute_cost(world.density, simulation.positions) / compute_cost(world.density, world.starts)
@@ -154,16 +93,10 @@ def run_ours(name: str, seed: int, *, duration: float, communication_range: floa
 
 def run_theirs(name: str, seed: int, *, duration: float) -> float:
     """Return the fraction of the initial cost that a controller of CoverageControl leaves."""
-    library = load_coverage_control()
+    library = load_library()
     parameters = library.Parameters()
     world = draw_world(seed)
-    world_density = library.WorldIDF(parameters)
-    for peak in world.peaks:
-        center = np.array([peak.x, peak.y])
-        world_density.AddNormalDistribution(
-            library.BivariateNormalDistribution(center, peak.sigma, peak.mass)
-        )
-    world_density.GenerateMap()
+    world_density = build_world_density(library, parameters, world.peaks)
     # Its maps are indexed by x, then y, and have single precision.
     differences = np.asarray(world_density.GetWorldMap()).T - world.density
     if np.abs(differences).mean() > MAX_MEAN_DIFFERENCE:
@@ -176,23 +109,6 @@ def run_theirs(name: str, seed: int, *, duration: float) -> float:
         controller.ComputeActions()
         system.StepActions(controller.GetActions())
     return float(system.GetObjectiveValue() / initial_cost)
-
-
-def load_coverage_control() -> Any:
-    """Load the compiled part of CoverageControl, which contains the simulator and its controllers.
-
-    Its Python package imports PyTorch Geometric even if only this part is used.
-    """
-    if "coverage_control" not in sys.modules:
-        spec = importlib.util.find_spec("coverage_control")
-        if spec is None or spec.submodule_search_locations is None:
-            raise SystemExit(
-                'CoverageControl is missing: pip install "robocov[coverage-control]", or use --ours'
-            )
-        package = ModuleType("coverage_control")
-        package.__path__ = [str(Path(folder)) for folder in spec.submodule_search_locations]
-        sys.modules["coverage_control"] = package
-    return importlib.import_module("coverage_control._core")
 
 
 class Row(NamedTuple):
@@ -250,6 +166,10 @@ def main() -> None:
     limited = partial(run_ours, duration=arguments.duration, communication_range=COMMUNICATION_RANGE_M)
     runs: dict[str, Callable[[int], float]] = {}
     if not arguments.ours:
+        try:
+            load_library()
+        except ParameterError as error:
+            raise SystemExit(f"{error}, or use --ours") from None
         for name in THEIR_CONTROLLERS:
             runs[format_their_label(name)] = partial(run_theirs, name, duration=arguments.duration)
     runs[CLAIRVOYANT_LLOYD_LABEL] = partial(

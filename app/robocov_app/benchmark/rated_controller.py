@@ -15,6 +15,8 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.coverage_control_cvt import PEAKS_KEY
+from robocov_app.benchmark.maps.worlds import draw_peaks
 from robocov_app.benchmark.results import find_reference
 from robocov_app.sweep.study.controller_files import read_controller_source
 from robocov_app.sweep.study.study import Study, StudyMap
@@ -25,7 +27,13 @@ LEARNED = "learned"
 """Name of the controller with a trained network; see `robocov_app.benchmark.learned`."""
 STAND_IN = "rapf"
 """Controller that replaces the controller of a user in studies that must not execute the user's code."""
-_FILES = {ORACLE: "oracle.py:Oracle", LEARNED: "learned.py:Learned"}
+COVERAGE_CONTROL = {
+    "coverage-control-clairvoyant": "coverage_control_cvt.py:ClairvoyantCvt",
+    "coverage-control-centralized": "coverage_control_cvt.py:CentralizedCvt",
+    "coverage-control-decentralized": "coverage_control_cvt.py:DecentralizedCvt",
+}
+"""Controllers of another simulator, which need its library, and their files in this folder."""
+_FILES = {ORACLE: "oracle.py:Oracle", LEARNED: "learned.py:Learned", **COVERAGE_CONTROL}
 """Controllers that only the benchmark has, and their files in this folder."""
 
 
@@ -67,7 +75,7 @@ class RatedController:
     Parameters
     ----------
     controller : str
-        Name of a controller, ``FILE.py:CLASS``, "oracle" or "learned".
+        Name of a controller, ``FILE.py:CLASS``, or the name of a controller that only the benchmark has.
     gains : Mapping
         Gains that differ from the defaults.
     """
@@ -92,6 +100,8 @@ class RatedController:
                 environment = suite.load_suite_map(map_name)
                 if self.controller == ORACLE:
                     environment = _add_placements(environment, track, map_name)
+                if self.controller in COVERAGE_CONTROL:
+                    environment = _add_peaks(environment, map_name)
                 maps.append(StudyMap(map_name, environment))
             yield track, self.build_study(track, maps, seeds)
 
@@ -113,6 +123,11 @@ class RatedController:
         name, folder = self._locate_controller()
         gains = {name: dict(self.gains)} if self.gains else {}
         return suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder)
+
+    @property
+    def decides_jointly(self) -> bool:
+        """Whether one decision is made for all robots at once, by more than what each robot knows."""
+        return self.controller == ORACLE or self.controller in COVERAGE_CONTROL
 
     @property
     def is_built_in(self) -> bool:
@@ -222,3 +237,20 @@ def _add_placements(environment: Environment, track_name: str, map_name: str) ->
         working = [robot for robot in working if robot != failed_robot]
         time = failure_time
     return replace(environment, extra={**environment.extra, "oracle": stages})
+
+
+def _add_peaks(environment: Environment, map_name: str) -> Environment:
+    """Return a map with the peaks of its density, for the controllers of CoverageControl.
+
+    Raises
+    ------
+    ParameterError
+        If the map is not a world by the rules of CoverageControl.
+    """
+    if suite.FAMILY_OF[map_name] != suite.WORLDS:
+        raise ParameterError(
+            f"--controller: controllers of CoverageControl need maps of the family {suite.WORLDS}: "
+            f"expected --track open-square, got map {map_name}"
+        )
+    peaks = draw_peaks(int(map_name.rpartition("-")[2]))
+    return replace(environment, extra={**environment.extra, PEAKS_KEY: [list(peak) for peak in peaks]})

@@ -54,8 +54,9 @@ class Arguments(JsonOption):
       suite       list the tracks and maps
       references  compute missing best placements of the suite
 
-    Two more controllers are available: `oracle` knows the best placements and moves straight to them, and
-    `learned` is a neural network that imitates a planner.
+    More controllers are available: `oracle` knows the best placements and moves straight to them, `learned`
+    is a neural network that imitates a planner, and `coverage-control-clairvoyant`, `-centralized` and
+    `-decentralized` are those of another simulator, for the track open-square.
 
     Example: robocov benchmark --controller mine.py:MyController --quick --out mine
     """
@@ -68,7 +69,7 @@ class Arguments(JsonOption):
     paths: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[DIR ...]")] = ()
     """Results, for verify and page."""
     controller: str | None = None
-    """Name of a controller, FILE.py:CLASS, oracle or learned; verify needs it only for FILE.py:CLASS."""
+    """Name of a controller, or FILE.py:CLASS; verify needs it only for FILE.py:CLASS."""
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="GAIN=VALUE ...")] = ()
     """Gains that differ from their defaults."""
     track: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TRACK ...")] = ()

@@ -27,8 +27,9 @@ If the density is unknown, no process has it: the referee measures it on behalf 
 sensing range.
 
 The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
-an empty scan. Only the oracle, whose robots decide together, has no processes for single robots. Its check
-shows that its decisions follow from the observations and the map, but ignores the limits of communication.
+an empty scan. The oracle and the controllers of CoverageControl, which decide for all robots at once, have
+no processes for single robots. Their check shows that their decisions follow from the observations and the
+map, but ignores the limits of communication.
 """
 
 from __future__ import annotations

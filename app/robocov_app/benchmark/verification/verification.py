@@ -35,7 +35,7 @@ from robocov.kernel_compilation import ALL_EXAMPLES, compile_kernels
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.controller_code import ControllerCode
-from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
+from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL, ORACLE, RatedController, Selection
 from robocov_app.benchmark.references import RESTARTS
 from robocov_app.benchmark.result_checks import Row
 from robocov_app.benchmark.results import build_row, compute_gaps, read_result
@@ -375,7 +375,7 @@ def verify_result(
         checker = _RunChecker(
             code,
             description,
-            is_joint=rated.controller == ORACLE,
+            is_joint=rated.decides_jointly,
             robots=options.robots,
             seed=seed,
             cache_folder=Path(cache_folder),
@@ -473,6 +473,8 @@ def _plan_new_runs(
         return _NewRuns("--new-maps is 0")
     if rated.controller == ORACLE:
         return _NewRuns("the oracle needs their best placements, which are not known")
+    if rated.controller in COVERAGE_CONTROL:
+        return _NewRuns("controllers of CoverageControl run on the worlds of the suite only")
     maps_by_track = {track: [study_map.name for study_map in study.maps] for track, study in studies.items()}
     track = choose_track(maps_by_track, count, rng)
     if track is None:
