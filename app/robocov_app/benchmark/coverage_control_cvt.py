@@ -224,7 +224,7 @@ class ClairvoyantCvt(LibraryController):
     """Lloyd's algorithm with the true density and the positions of all robots."""
 
     name = "coverage-control-clairvoyant"
-    label = "Clairvoyant CVT (CoverageControl)"
+    label = "Clairvoyant CVT"
     summary = "CoverageControl's Lloyd's algorithm, which knows the density and all positions"
     algorithm = "ClairvoyantCVT"
 
@@ -234,7 +234,7 @@ class CentralizedCvt(LibraryController):
     """Lloyd's algorithm with what the whole team has sensed, and the positions of all robots."""
 
     name = "coverage-control-centralized"
-    label = "Centralized CVT (CoverageControl)"
+    label = "Centralized CVT"
     summary = "CoverageControl's Lloyd's algorithm with what the whole team has sensed, and all positions"
     algorithm = "CentralizedCVT"
 
@@ -244,6 +244,6 @@ class DecentralizedCvt(LibraryController):
     """Lloyd's algorithm with what each robot has sensed, and the positions in communication range."""
 
     name = "coverage-control-decentralized"
-    label = "Decentralized CVT (CoverageControl)"
+    label = "Decentralized CVT"
     summary = "CoverageControl's Lloyd's algorithm with what each robot has sensed, and positions in range"
     algorithm = "DecentralizedCVT"

@@ -253,6 +253,7 @@ def test_robots_of_a_run_without_decisions_are_not_counted(
     [
         ("lloyd", 0, "--new-maps is 0"),
         (ORACLE, 5, "the oracle needs their best placements"),
+        ("coverage-control-centralized", 5, "controllers of CoverageControl run on the worlds"),
         ("lloyd", 5, "they require runs on maps of families that have a generator"),
     ],
 )

@@ -33,8 +33,11 @@ from robocov_app.benchmark.maps.worlds import (
     merge_pixels,
 )
 from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL, RatedController, Selection
+from robocov_app.benchmark.running import run_benchmark
+from robocov_app.benchmark.verification.verification import VerificationOptions, verify_result
 from robocov_app.sweep.study.parameters import build_swept_team
 from robocov_app.sweep.tasks import generate_tasks
+from robocov_app.terminal.interruption import Interruption
 
 TRACK = "open-square"
 MAP = "worlds-7001"
@@ -230,6 +233,23 @@ def test_the_library_builds_the_same_density() -> None:
     # Its maps are indexed by x, then y, and have single precision.
     differences = np.asarray(density.GetWorldMap()).T - world.density
     assert np.abs(differences).mean() < 1e-3
+
+
+@NEEDS_LIBRARY
+def test_controllers_of_the_library_can_be_rated_and_verified(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    track = replace(suite.TRACKS[TRACK], duration=2.5, maps=(MAP,))
+    monkeypatch.setitem(suite.TRACKS, TRACK, track)  # type: ignore[arg-type]
+    rated = RatedController("coverage-control-decentralized", {})
+    options = VerificationOptions(sample=1, robots=1, new_maps=1)
+    with Interruption() as stop:
+        result = run_benchmark(rated, Selection(tracks=(TRACK,)), tmp_path, stop=stop, workers=1, quiet=True)
+        verification = verify_result(tmp_path, options=options, stop=stop, quiet=True)
+    assert result is not None
+    assert [row["map"] for row in result["rows"]] == [MAP]
+    assert verification.differences == []
+    assert (verification.runs, verification.teams, verification.robots) == (1, 1, 0)
 
 
 @NEEDS_LIBRARY

@@ -105,6 +105,10 @@ def test_labels_in_all_scripts_need_only_one_visible_character(tmp_path: Path) -
         (change_first_row(stuck_robots=7), "rows[0]: stuck_robots: expected at most 6, got 7"),
         (change_first_row(min_clearance_m=-0.2), "rows[0]: min_clearance_m: expected at least -0.1, got"),
         (
+            choose_row("open-square", min_clearance_m=-1.1),
+            "rows[0]: min_clearance_m: expected at least -1.0, got",
+        ),
+        (
             change_first_row(min_clearance_m=0.0005, contacts=0),
             "rows[0]: contacts: expected at least 1 for a clearance of 0.0005 m, got 0",
         ),
