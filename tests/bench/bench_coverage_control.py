@@ -83,7 +83,7 @@ def run_ours(name: str, seed: int, *, duration: float, communication_range: floa
         sensing_range=SENSING_RANGE_M,
         communication_range=communication_range,
     )
-    # The raster of the map is coarser, and has the same mass in each pixel.
+    # The map has a coarser raster. Averaging preserves the mass.
     environment = build_open_square("world", merge_pixels(world.density))
     simulation = Simulation(environment, make_controller(name), world.starts, team)
     while simulation.time < duration:
@@ -169,7 +169,7 @@ def main() -> None:
         try:
             load_library()
         except ParameterError as error:
-            raise SystemExit(f"{error}, or use --ours") from None
+            raise SystemExit(f"{error}. Pass --ours to run only the controllers of robocov.") from None
         for name in THEIR_CONTROLLERS:
             runs[format_their_label(name)] = partial(run_theirs, name, duration=arguments.duration)
     runs[CLAIRVOYANT_LLOYD_LABEL] = partial(

@@ -1,15 +1,15 @@
-"""Controllers of CoverageControl, whose own library decides: a comparison for the track ``open-square``.
+"""Controllers of CoverageControl, computed by its own library, for the track ``open-square``.
 
 CoverageControl (Agarwal et al. 2024, LPAC) is another simulator of coverage control, see
 `robocov_app.benchmark.maps.worlds`. At each of its decisions, its library receives the positions of all
 robots and returns their velocities, which the robots track.
 
-The benchmark passes this file to its runs like a user's controller, because these controllers are not
-distributed: the library decides for all robots at once, and simulates sensing and communication itself. It
-therefore needs the true density, which is hidden from all other controllers on this track. The peaks of the
-density are in the extra content of the map, under `PEAKS_KEY`: a list of ``[x, y, sigma, mass]``. What each
-robot uses of this is up to the library. A verification can repeat these runs, but not check what single
-robots know.
+The benchmark passes this file to its runs like a user's controller, because these controllers cannot run
+separately for each robot: the library computes the velocities of all robots at once, and simulates sensing
+and communication itself. It therefore needs the true density, which is hidden from all other controllers on
+this track. The peaks of the density are in the extra content of the map, under `PEAKS_KEY`: a list of
+``[x, y, sigma, mass]``. The library decides how much of it each robot uses. A verification can repeat the
+runs, but cannot check what individual robots know.
 """
 
 from __future__ import annotations
@@ -44,8 +44,9 @@ LIBRARY = "coverage_control"
 def load_library() -> Any:
     """Load the compiled part of CoverageControl, which contains the simulator and its controllers.
 
-    Its Python package imports PyTorch Geometric even if only this part is used. Therefore, it is replaced by
-    an empty package with the same folders.
+    Its Python package imports PyTorch Geometric, which this part does not need. An empty package with the
+    same search path therefore takes its place in this process, and the extension module ``_core`` is
+    imported directly: the package exports its classes under no other name.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def build_world_density(library: Any, parameters: Any, peaks: Any) -> Any:
     parameters : object
         Parameters of the library.
     peaks : sequence of (x, y, sigma, mass)
-        Center and standard deviation of each Gaussian, m, and its integral without the cut.
+        Center and standard deviation of each Gaussian, m, and its integral before truncation.
 
     Returns
     -------
@@ -98,8 +99,9 @@ def build_world_density(library: Any, parameters: Any, peaks: Any) -> Any:
 class LibraryRun:
     """A run in the library: its maps of what has been sensed, and the controller that reads them.
 
-    The state of the library depends on the positions that it has received alone. If it has received others
-    than expected, because a simulation was rewound, it starts again and receives the expected ones.
+    The state of the library depends only on the positions that it has received. If these are not the
+    beginning of the history, for example because the simulation was rewound, the run is restarted and the
+    history is replayed.
 
     Parameters
     ----------
@@ -115,9 +117,13 @@ class LibraryRun:
         self._peaks = peaks
         self._received: FloatArray | None = None
         """Positions that the library has received, (k, n, 2) m; None before the start."""
+        self._system: Any = None
+        """``CoverageSystem`` of the library; None before the start."""
+        self._controller: Any = None
+        """Controller of the library; None before the start."""
 
     def decide(self, history: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Let the library decide.
+        """Compute the velocities and goals for the last positions of a history.
 
         Parameters
         ----------
@@ -135,13 +141,14 @@ class LibraryRun:
         for positions in history[len(self._received) :]:
             self._system.SetGlobalRobotPositions(self._library.PointVector(list(positions)))
         self._received = history
+        # The result depends only on the state of the system, so the computation may be repeated.
         self._controller.ComputeActions()
         velocities = np.array(list(self._controller.GetActions()), dtype=float).reshape(-1, 2)
         goals = np.array(list(self._controller.GetGoals()), dtype=float).reshape(-1, 2)
         return velocities, goals
 
     def _start(self, starts: FloatArray) -> None:
-        """Build the world, and a team at some starts, (n, 2) m."""
+        """Build the world, and a team at the given starting positions, (n, 2) m."""
         parameters = self._library.Parameters()
         world_density = build_world_density(self._library, parameters, self._peaks)
         self._system = self._library.CoverageSystem(
@@ -167,7 +174,7 @@ class LibraryMemory:
     history: FloatArray
     """Positions at all decisions so far, (k, n, 2) m."""
     velocities: FloatArray
-    """Desired velocities since the last decision, (n, 2) m/s."""
+    """Velocities that the last decision returned, (n, 2) m/s."""
     goals: FloatArray
     """Goals of the last decision, (n, 2) m."""
     decision_time: float = -np.inf
@@ -176,10 +183,10 @@ class LibraryMemory:
 
 @dataclass(frozen=True)
 class LibraryController(WholeMapController):
-    """Base class of controllers whose decisions are those of the library, once in each of its time steps.
+    """Base class of controllers that query the library once in each of its time steps.
 
-    A robot of the library moves exactly at the returned velocity until the next step. In a simulation,
-    forces track this velocity with the time constant `response_time`, up to the maximum acceleration.
+    In CoverageControl, a robot moves at exactly the returned velocity until the next step. Here, forces track
+    this velocity with the time constant `response_time`, up to the maximum acceleration.
     """
 
     algorithm: ClassVar[str]
@@ -196,7 +203,8 @@ class LibraryController(WholeMapController):
         """Return the memory before the first decision; raise ParameterError if the map has no peaks."""
         if PEAKS_KEY not in self.get_environment().extra:
             raise ParameterError(
-                f"controller {self.name!r}: expected a map of the track open-square of the benchmark"
+                f"controller {self.name!r}: expected a map with the peaks of its density under "
+                f"{PEAKS_KEY!r}, got none: robocov benchmark --controller {self.name} adds them"
             )
         robots = len(team)
         return LibraryMemory(
@@ -208,7 +216,7 @@ class LibraryController(WholeMapController):
         )
 
     def decide(self, seen: Observations, memory: LibraryMemory) -> Decision:
-        """Compute the forces that track the velocities of the last decision of the library."""
+        """Compute the forces that track the velocities last returned by the library."""
         if is_plan_due(memory.decision_time, memory.period, seen.time):
             history = np.concatenate([memory.history, seen.positions[None]])
             velocities, goals = _get_library_run(self.algorithm, self.get_environment()).decide(history)
@@ -224,8 +232,8 @@ class ClairvoyantCvt(LibraryController):
     """Lloyd's algorithm with the true density and the positions of all robots."""
 
     name = "coverage-control-clairvoyant"
-    label = "Clairvoyant CVT"
-    summary = "CoverageControl's Lloyd's algorithm, which knows the density and all positions"
+    label = "CoverageControl, clairvoyant"
+    summary = "Lloyd's algorithm of CoverageControl with the true density and all positions"
     algorithm = "ClairvoyantCVT"
 
 
@@ -234,8 +242,8 @@ class CentralizedCvt(LibraryController):
     """Lloyd's algorithm with what the whole team has sensed, and the positions of all robots."""
 
     name = "coverage-control-centralized"
-    label = "Centralized CVT"
-    summary = "CoverageControl's Lloyd's algorithm with what the whole team has sensed, and all positions"
+    label = "CoverageControl, centralized"
+    summary = "Lloyd's algorithm of CoverageControl with what the whole team has sensed, and all positions"
     algorithm = "CentralizedCVT"
 
 
@@ -244,6 +252,6 @@ class DecentralizedCvt(LibraryController):
     """Lloyd's algorithm with what each robot has sensed, and the positions in communication range."""
 
     name = "coverage-control-decentralized"
-    label = "Decentralized CVT"
-    summary = "CoverageControl's Lloyd's algorithm with what each robot has sensed, and positions in range"
+    label = "CoverageControl, decentralized"
+    summary = "Lloyd's algorithm of CoverageControl with what each robot has sensed, and positions in range"
     algorithm = "DecentralizedCVT"

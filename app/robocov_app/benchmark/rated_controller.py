@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,12 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.controller_code import ControllerCode
-from robocov_app.benchmark.coverage_control_cvt import PEAKS_KEY
+from robocov_app.benchmark.coverage_control_cvt import LIBRARY, PEAKS_KEY
 from robocov_app.benchmark.maps.worlds import draw_peaks
 from robocov_app.benchmark.results import find_reference
 from robocov_app.sweep.study.controller_files import read_controller_source
 from robocov_app.sweep.study.study import Study, StudyMap
+from robocov_app.sweep.worker import list_result_versions
 
 ORACLE = "oracle"
 """Name of the controller that knows the reference placements; see `robocov_app.benchmark.oracle`."""
@@ -27,13 +29,13 @@ LEARNED = "learned"
 """Name of the controller with a trained network; see `robocov_app.benchmark.learned`."""
 STAND_IN = "rapf"
 """Controller that replaces the controller of a user in studies that must not execute the user's code."""
-COVERAGE_CONTROL = {
+COVERAGE_CONTROL_FILES = {
     "coverage-control-clairvoyant": "coverage_control_cvt.py:ClairvoyantCvt",
     "coverage-control-centralized": "coverage_control_cvt.py:CentralizedCvt",
     "coverage-control-decentralized": "coverage_control_cvt.py:DecentralizedCvt",
 }
-"""Controllers of another simulator, which need its library, and their files in this folder."""
-_FILES = {ORACLE: "oracle.py:Oracle", LEARNED: "learned.py:Learned", **COVERAGE_CONTROL}
+"""Controllers of CoverageControl, which need its library, and their files in this folder."""
+_FILES = {ORACLE: "oracle.py:Oracle", LEARNED: "learned.py:Learned", **COVERAGE_CONTROL_FILES}
 """Controllers that only the benchmark has, and their files in this folder."""
 
 
@@ -75,7 +77,7 @@ class RatedController:
     Parameters
     ----------
     controller : str
-        Name of a controller, ``FILE.py:CLASS``, or the name of a controller that only the benchmark has.
+        Name of a controller, including those that only the benchmark has, or ``FILE.py:CLASS``.
     gains : Mapping
         Gains that differ from the defaults.
     """
@@ -100,8 +102,8 @@ class RatedController:
                 environment = suite.load_suite_map(map_name)
                 if self.controller == ORACLE:
                     environment = _add_placements(environment, track, map_name)
-                if self.controller in COVERAGE_CONTROL:
-                    environment = _add_peaks(environment, map_name)
+                if self.controller in COVERAGE_CONTROL_FILES:
+                    environment = _add_peaks(environment, self.controller, track, map_name)
                 maps.append(StudyMap(map_name, environment))
             yield track, self.build_study(track, maps, seeds)
 
@@ -126,8 +128,15 @@ class RatedController:
 
     @property
     def decides_jointly(self) -> bool:
-        """Whether one decision is made for all robots at once, by more than what each robot knows."""
-        return self.controller == ORACLE or self.controller in COVERAGE_CONTROL
+        """Whether the controller decides for all robots at once, by information that no single robot has."""
+        return self.controller == ORACLE or self.controller in COVERAGE_CONTROL_FILES
+
+    def list_versions(self) -> dict[str, str]:
+        """Return the versions of the packages on which results of the controller depend, by name."""
+        versions = dict(list_result_versions())
+        if self.controller in COVERAGE_CONTROL_FILES:
+            versions[LIBRARY] = version(LIBRARY)
+        return versions
 
     @property
     def is_built_in(self) -> bool:
@@ -239,18 +248,15 @@ def _add_placements(environment: Environment, track_name: str, map_name: str) ->
     return replace(environment, extra={**environment.extra, "oracle": stages})
 
 
-def _add_peaks(environment: Environment, map_name: str) -> Environment:
+def _add_peaks(environment: Environment, controller: str, track: str, map_name: str) -> Environment:
     """Return a map with the peaks of its density, for the controllers of CoverageControl.
 
     Raises
     ------
     ParameterError
-        If the map is not a world by the rules of CoverageControl.
+        If the map is not in the family `worlds`.
     """
     if suite.FAMILY_OF[map_name] != suite.WORLDS:
-        raise ParameterError(
-            f"--controller: controllers of CoverageControl need maps of the family {suite.WORLDS}: "
-            f"expected --track open-square, got map {map_name}"
-        )
+        raise ParameterError(f"--track: expected open-square for {controller}, got {track}")
     peaks = draw_peaks(int(map_name.rpartition("-")[2]))
     return replace(environment, extra={**environment.extra, PEAKS_KEY: [list(peak) for peak in peaks]})

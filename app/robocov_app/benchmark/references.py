@@ -1,7 +1,7 @@
 """Reference placements and certified lower bounds for the maps of the suite, which its file contains."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -30,7 +30,7 @@ _POSITION_DIGITS = 4
 
 
 class ReferenceSetting(NamedTuple):
-    """Setting of a reference placement of the suite."""
+    """Map, team and time for which a reference placement is searched."""
 
     map_name: str
     robots: int
@@ -47,7 +47,7 @@ def list_references() -> list[ReferenceSetting]:
     Returns
     -------
     list of ReferenceSetting
-        One for each map and number of robots.
+        One for each map and number of robots. All tracks with this map have robots of the same size.
     """
     settings: dict[tuple[str, int], ReferenceSetting] = {}
     for track in suite.TRACKS.values():
@@ -160,6 +160,17 @@ def _build_reference(slot: _ReferenceSlot, placement: ReferencePlacement) -> dic
     }
 
 
+class BoundQuery(NamedTuple):
+    """Inputs of a lower bound."""
+
+    document: dict[str, Any]
+    """The map as JSON."""
+    positions: list[list[float]]
+    """Positions of the best known placement, m."""
+    radius: float
+    """Radius of a robot, m."""
+
+
 def _compute_bounds(
     slots: Mapping[str, _ReferenceSlot], workers: int, stop: Interruption, report_answer: Callable[[], None]
 ) -> None:
@@ -175,29 +186,21 @@ def _compute_bounds(
         report_answer()
 
 
-class BoundQuery(NamedTuple):
-    """Inputs of a lower bound."""
-
-    document: Mapping[str, Any]
-    """The map as JSON."""
-    positions: Sequence[Sequence[float]]
-    """Positions of the best known placement, m."""
-    radius: float
-    """Radius of a robot, m."""
-
-
 class LowerBoundService:
     """Worker service that computes certified lower bounds of the mean distance."""
 
     failure_message = "the bound failed"
 
     def __call__(self, requests: list[BoundQuery], channel: Channel) -> float:
-        """Return a lower bound for the mean distance of all placements, m, which may take minutes."""
+        """Return a lower bound for the mean distance of all placements, m, which may take minutes.
+
+        Only the last request is answered.
+        """
         from robocov.lower_bound import compute_lower_bound
 
         query = requests[-1]
         bound = compute_lower_bound(
-            from_json(dict(query.document)),
+            from_json(query.document),
             np.array(query.positions),
             radius=query.radius,
             lattice=suite.LATTICE,
@@ -224,7 +227,10 @@ def _save_maps(path: Path, maps: Mapping[str, Any]) -> None:
         "lattice": suite.LATTICE,
         "restarts": RESTARTS,
         "seed": SEED,
-        "radius_m": {name: track.radius for name, track in suite.TRACKS.items()},
+        "radius_m": suite.ROBOT_RADIUS_M,
+        "radius_m_by_track": {
+            name: track.radius for name, track in suite.TRACKS.items() if track.radius != suite.ROBOT_RADIUS_M
+        },
         "precision": BOUND_PRECISION,
     }
     lines = []

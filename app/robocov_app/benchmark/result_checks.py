@@ -36,8 +36,8 @@ METRICS = (
 MAX_LABEL_CHARS = 60
 """Maximum length of the label of an entry."""
 MIN_GAP = -0.05
-"""Minimum gap to a reference placement. The lower bounds of the suite prove that no gap is below -0.034; this
-limit also holds for references without a lower bound."""
+"""Minimum gap to a reference placement. The lower bounds of the suite prove that no gap is below -0.034. The
+limit is also applied to references without a lower bound, for which nothing is proven."""
 MAX_TEXT_CHARS = 200
 """Maximum length of the name of a controller, gain, package or file, and of the value of a gain as text."""
 MAX_ITEMS = 200

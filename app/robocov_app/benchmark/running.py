@@ -22,7 +22,7 @@ from robocov_app.sweep.ledger import Ledger
 from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.sweep.tasks import generate_tasks
-from robocov_app.sweep.worker import EFFORT_FILE, list_result_versions
+from robocov_app.sweep.worker import EFFORT_FILE
 from robocov_app.terminal.interruption import Interruption
 
 TRACKS_FOLDER = "tracks"
@@ -89,19 +89,19 @@ def run_benchmark(
         for row in track_rows:
             check_sent_bytes(row, entry["information"], f"{track} on {row['map']}")
         rows += track_rows
-    result = _describe_result(entry, selection)
+    result = _describe_result(entry, selection, controller.list_versions())
     _write_result(out / RESULT_FILE, result, rows)
     return {**result, "rows": rows}
 
 
-def _describe_result(entry: dict[str, Any], selection: Selection) -> dict[str, Any]:
+def _describe_result(entry: dict[str, Any], selection: Selection, versions: dict[str, str]) -> dict[str, Any]:
     """Return a result without rows; `entry` is the description of the controller."""
     return {
         **RESULT_FORMAT,
         "suite": identify_suite(),
         "selection": {"quick": selection.quick, "tracks": selection.tracks, "maps": selection.maps},
         "entry": entry,
-        "versions": list_result_versions(),
+        "versions": versions,
         "method": describe_method(),
     }
 

@@ -63,7 +63,7 @@ _LARGE_SIDE_M = 20.0
 _LARGE_KINDS = ("polygons", "blocks", "rooms", "caves")
 """Generators of maps for large teams."""
 WORLDS = "worlds"
-"""Family of the maps by the rules of CoverageControl, another simulator."""
+"""Family of maps with the default parameters of the simulator CoverageControl."""
 
 
 def _list_names(kind: str, count: int, first_seed: int = _FIRST_SEED) -> tuple[str, ...]:
@@ -162,8 +162,8 @@ TRACKS: Mapping[str, Track] = {
         ranking="",
     ),
     "open-square": Track(
-        "an open square of 1024 m with 32 peaks, which robots have to find: the density can only be "
-        "measured; communication range of 128 m, sensing range of 32 m",
+        "square of 1024 x 1024 m without walls, whose density has 32 peaks and can only be measured; "
+        "communication range of 128 m, sensing range of 32 m",
         OTHER_FAMILIES[WORLDS],
         robots=WORLD_ROBOTS,
         duration=120.0,

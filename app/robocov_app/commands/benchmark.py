@@ -54,9 +54,10 @@ class Arguments(JsonOption):
       suite       list the tracks and maps
       references  compute missing best placements of the suite
 
-    More controllers are available: `oracle` knows the best placements and moves straight to them, `learned`
-    is a neural network that imitates a planner, and `coverage-control-clairvoyant`, `-centralized` and
-    `-decentralized` are those of another simulator, for the track open-square.
+    More controllers are available: `oracle` knows the best placements and moves straight to them, and
+    `learned` is a neural network that imitates a planner. `coverage-control-clairvoyant`, `-centralized` and
+    `-decentralized` are the controllers of the simulator CoverageControl, for the track open-square only;
+    they need the extra coverage-control.
 
     Example: robocov benchmark --controller mine.py:MyController --quick --out mine
     """

@@ -268,21 +268,27 @@ class Ledger:
             raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
 
 
-def describe_version_differences(versions: Mapping[str, str]) -> str:
+def describe_version_differences(
+    versions: Mapping[str, str], current_versions: Mapping[str, str] | None = None
+) -> str:
     """Describe how versions differ from those of this process.
 
     Parameters
     ----------
     versions : mapping of str to str
         Versions by package; missing packages do not count as different.
+    current_versions : mapping of str to str, optional
+        Versions in this process. By default, those of the packages on which every result depends.
 
     Returns
     -------
     str
         Such as ``numpy 2.0.1 instead of 2.1.0``; empty if there are no differences.
     """
+    if current_versions is None:
+        current_versions = list_result_versions()
     differences = []
-    for name, current in list_result_versions().items():
+    for name, current in current_versions.items():
         if versions.get(name, current) != current:
             differences.append(f"{name} {versions[name]} instead of {current}")
     return ", ".join(differences)

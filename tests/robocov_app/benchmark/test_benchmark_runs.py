@@ -25,7 +25,7 @@ from robocov_app.benchmark import suite
 from robocov_app.benchmark.coverage_control_cvt import CentralizedCvt, ClairvoyantCvt, DecentralizedCvt
 from robocov_app.benchmark.learned import Learned
 from robocov_app.benchmark.oracle import Oracle
-from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL, RatedController, Selection
+from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL_FILES, RatedController, Selection
 from robocov_app.benchmark.results import (
     ENTRIES,
     RESULT_FILE,
@@ -109,7 +109,7 @@ def test_runs_are_rated_verified_and_shown_on_a_page(
 def test_bundled_results_are_complete() -> None:
     """Each result has all runs of the core tracks, with gaps that agree with the costs.
 
-    Only the controllers of another simulator have no runs on these tracks.
+    Only the controllers of CoverageControl have no runs on these tracks.
     """
     results = load_bundled_results()
     assert {"rapf", "lloyd", "rpf", "oracle"} <= {result["entry"]["controller"] for result in results}
@@ -125,7 +125,7 @@ def test_bundled_results_are_complete() -> None:
         else:
             assert result["entry"]["label"] == load_controller_class(controller).label
         rows = {(row["track"], row["map"], row["seed"]) for row in result["rows"]}
-        if controller in COVERAGE_CONTROL:
+        if controller in COVERAGE_CONTROL_FILES:
             assert {row[0] for row in rows} == {"open-square"}
         else:
             assert {row for row in rows if row[0] in suite.RANKED_TRACKS["core"]} == runs

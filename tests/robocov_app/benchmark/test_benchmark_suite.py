@@ -84,6 +84,15 @@ def test_the_suite_is_complete_and_tuning_maps_are_separate() -> None:
         assert len(references[str(setting.robots)]["positions_m"]) == setting.robots
 
 
+def test_robots_have_the_same_size_on_all_tracks_of_a_map() -> None:
+    """Otherwise, a reference placement for this map and team size would not be that of both tracks."""
+    radii: dict[str, set[float]] = {}
+    for track in suite.TRACKS.values():
+        for name in track.maps:
+            radii.setdefault(name, set()).add(track.radius)
+    assert all(len(sizes) == 1 for sizes in radii.values())
+
+
 def test_references_have_the_stated_cost() -> None:
     settings = {(setting.map_name, setting.robots): setting for setting in list_references()}
     assert settings["worlds-7001", 32].radius == 1.0

@@ -19,7 +19,7 @@ from robocov.controllers import CONTROLLERS
 from robocov.typing import FloatArray
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.page.anomalies import find_anomalies
-from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL
+from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL_FILES
 from robocov_app.benchmark.ratings import Rating, build_ratings, get_run_key
 from robocov_app.benchmark.references import RESTARTS
 from robocov_app.benchmark.results import ENTRIES, load_bundled_results, read_result
@@ -131,9 +131,17 @@ UNKNOWN_DENSITY_ROWS = [
 """Controllers with runs on the track of an unknown density."""
 OPEN_SQUARE_ROWS = [
     (controller, "open-square")
-    for controller in (*COVERAGE_CONTROL, "exploring-lloyd", "rapf", "gp-ucb", "lloyd", "adaptive")
+    for controller in (
+        *COVERAGE_CONTROL_FILES,
+        "exploring-lloyd",
+        "atlas-shared",
+        "rapf",
+        "gp-ucb",
+        "lloyd",
+        "adaptive",
+    )
 ]
-"""Controllers with runs on the track with the worlds of another simulator."""
+"""Controllers with runs on the track with the worlds of CoverageControl."""
 ROWS = [
     *(
         (controller, track)
@@ -181,7 +189,9 @@ def test_the_best_controller_with_own_information_on_large_plans_agrees_with_the
 
 def test_gaps_of_one_and_three_robots_on_the_same_plans_agree_with_the_entries() -> None:
     results = [
-        result for result in load_bundled_results() if result["entry"]["controller"] not in COVERAGE_CONTROL
+        result
+        for result in load_bundled_results()
+        if result["entry"]["controller"] not in COVERAGE_CONTROL_FILES
     ]
     gaps, path_lengths = {}, {}
     for result, track in product(results, ("plans-one-robot", "plans-small")):
@@ -221,6 +231,15 @@ def list_source_words(text: str) -> set[str]:
     return {kind for kind in kinds if kind in text}
 
 
+def test_paths_on_the_open_square_are_as_long_as_the_handbook_says() -> None:
+    paths = [
+        rate(name, "open-square").compute_median("path_length_m")
+        for name in ("exploring-lloyd", "coverage-control-centralized", "coverage-control-decentralized")
+    ]
+    assert sorted(round(paths[0] / path) for path in paths[1:]) == [4, 5]
+    assert "its robots move four to five times as far" in read_text(PAGE)
+
+
 def test_the_table_of_sources_agrees_with_the_docstrings() -> None:
     table = PAGE.read_text(encoding="utf-8").split("### Sources")[1].partition("Two recent methods")[0]
     listed = []
@@ -230,14 +249,14 @@ def test_the_table_of_sources_agrees_with_the_docstrings() -> None:
         names, sources = line.strip("| ").split(" | ")
         for name in re.findall(r"`([a-z-]+)`", names):
             listed.append(name)
-            if sources == "our own work" or "Renzaglia" in sources or name in COVERAGE_CONTROL:
+            if sources == "our own work" or "Renzaglia" in sources or name in COVERAGE_CONTROL_FILES:
                 continue
             docstring = " ".join((CONTROLLERS[name].__doc__ or "").split())
             passage = re.search(r"We (had only|did not have) .*", docstring)
             assert passage is not None, name
             assert list_source_words(sources) == list_source_words(passage[0]), name
             assert ("general knowledge" in sources) == (passage[1] == "did not have"), name
-    assert sorted(listed) == sorted([*CONTROLLERS, "learned", *COVERAGE_CONTROL])
+    assert sorted(listed) == sorted([*CONTROLLERS, "learned", *COVERAGE_CONTROL_FILES])
 
 
 def test_values_of_rapf_with_one_robot_agree_with_the_entry() -> None:

@@ -1,4 +1,4 @@
-"""The open square of another simulator: its worlds, its track, and its controllers, whose library decides."""
+"""The open square of CoverageControl: its worlds, its track, and its controllers, whose library decides."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from robocov_app.benchmark.maps.worlds import (
     draw_world,
     merge_pixels,
 )
-from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL, RatedController, Selection
+from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL_FILES, RatedController, Selection
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification.verification import VerificationOptions, verify_result
 from robocov_app.sweep.study.parameters import build_swept_team
@@ -80,8 +80,11 @@ def test_a_map_of_a_world_has_the_rounded_density_of_its_peaks() -> None:
     assert values.shape == (RASTER_PIXELS, RASTER_PIXELS)
     assert environment.density is not None
     pixel_side = SIDE_M / RASTER_PIXELS
-    points = np.array([[100.5, 37.5], [10.5, 200.5]]) * pixel_side
-    expected = [values[37, 100], values[200, 10]]
+    # A pixel in a peak, and the one with its row and column exchanged.
+    points = np.array([[197.5, 189.5], [189.5, 197.5]]) * pixel_side
+    expected = np.array([values[189, 197], values[197, 189]])
+    assert expected.min() > 0.1
+    assert abs(expected[0] - expected[1]) > 0.01
     np.testing.assert_allclose(environment.density.evaluate(points), expected, atol=0.0005)
 
 
@@ -92,6 +95,7 @@ def test_worlds_have_the_peaks_of_the_rules() -> None:
     assert world.starts.shape == (ROBOTS, 2)
     for peak in world.peaks:
         assert 0.0 <= peak.x <= SIDE_M
+        assert 0.0 <= peak.y <= SIDE_M
         assert 40.0 <= peak.sigma <= 50.0
         assert 6.0 <= peak.mass <= 10.0
 
@@ -103,16 +107,19 @@ def test_robots_of_the_track_have_the_limits_of_the_other_simulator() -> None:
     assert len(team) == ROBOTS
     assert set(team.radius) == {1.0}
     assert set(team.max_speed) == {5.0}
+    assert set(team.max_acceleration) == {10.0}
     assert set(team.sensing_range) == {32.0}
     assert set(team.communication_range) == {128.0}
-    assert task.hide_unknown_density().build_environment().density is None
+    hidden = task.hide_unknown_density().build_environment()
+    assert hidden.density is None
+    assert cvt.PEAKS_KEY not in hidden.extra
 
 
 def test_controllers_of_the_library_state_that_they_know_the_map() -> None:
     for controller_class in CLASSES:
         assert get_information(controller_class) == "whole map"
         assert RatedController(controller_class.name, {}).decides_jointly
-    assert COVERAGE_CONTROL.keys() == {controller_class.name for controller_class in CLASSES}
+    assert COVERAGE_CONTROL_FILES.keys() == {controller_class.name for controller_class in CLASSES}
 
 
 def test_a_missing_library_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,9 +211,13 @@ def test_robots_track_the_velocities_of_the_library(monkeypatch: pytest.MonkeyPa
     starts = environment.start(None).sample(ROBOTS, seed=0, radius=1.0)
     simulation = Simulation(environment, cvt.ClairvoyantCvt(), starts, build_team())
     record = simulation.run(0.35)
-    # The desired velocity grows by 1 m/s with each decision, and is reached with the response time.
+    # The library decides at 0, 0.1, 0.2 and 0.3 s. The desired velocity is 1 m/s at first, grows by 1 m/s
+    # with each decision, and is approached with the response time.
+    velocity = 0.0
+    for desired_velocity, duration in ((1.0, 0.1), (2.0, 0.1), (3.0, 0.1), (4.0, 0.05)):
+        velocity = desired_velocity + (velocity - desired_velocity) * np.exp(-duration / 0.1)
     velocities = record.velocities[-1]
-    assert (velocities[:, 0] > 1.0).all()
+    np.testing.assert_allclose(velocities[:, 0], velocity, rtol=0.1)
     np.testing.assert_allclose(velocities[:, 1], 0.0, atol=1e-9)
 
 
@@ -214,14 +225,16 @@ def test_controllers_of_the_library_need_a_map_of_the_track(monkeypatch: pytest.
     monkeypatch.setattr(cvt, "load_library", FakeLibrary)
     environment = build_world(7001)
     starts = environment.start(None).sample(ROBOTS, seed=0, radius=1.0)
-    with pytest.raises(ParameterError, match="expected a map of the track open-square"):
+    with pytest.raises(ParameterError, match=r"expected a map with the peaks of its density .* adds them"):
         Simulation(environment, cvt.ClairvoyantCvt(), starts, build_team())
 
 
 @NEEDS_LIBRARY
 def test_other_tracks_are_rejected() -> None:
     rated = RatedController("coverage-control-centralized", {})
-    with pytest.raises(ParameterError, match="expected --track open-square, got map rooms"):
+    with pytest.raises(
+        ParameterError, match=r"^--track: expected open-square for .*-centralized, got ideal$"
+    ):
         dict(rated.build_studies(Selection(tracks=("ideal",), maps=("rooms",))))
 
 

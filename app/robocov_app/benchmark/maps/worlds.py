@@ -1,8 +1,8 @@
 """Worlds in the default setting of CoverageControl: an open square with a density of many peaks.
 
-CoverageControl (Agarwal et al. 2024, LPAC) is another simulator of coverage control. By its default rules, a
-world is a square of 1024 m without walls, and its density is the sum of 32 circular Gaussians. Each is cut
-off at two standard deviations. Robots start anywhere.
+CoverageControl (Agarwal et al. 2024, LPAC) is another simulator of coverage control. By default, a world is
+a square of 1024 m without walls, and its density is the sum of 32 circular Gaussians. Each is cut off at two
+standard deviations. Robots start anywhere.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ PEAKS = 32
 SIGMA_RANGE_M = (40.0, 50.0)
 """Range of the standard deviation of a peak."""
 MASS_RANGE = (6.0, 10.0)
-"""Range of the integral of a peak without the cut."""
+"""Range of the integral of a peak before truncation."""
 TRUNCATION = 2.0
 """Distance from its center at which a peak ends, in standard deviations."""
 _START_MARGIN_M = 1.0
 """Minimum distance of the starts of `draw_world` from the sides."""
 _DENSITY_DIGITS = 3
-"""Number of decimal places of the density of a map, so that it is the same on every processor."""
+"""Number of decimal places of the density of a map. Rounding hides differences between processors, which
+would change the hash of the map."""
 
 
 class Peak(NamedTuple):
@@ -49,7 +50,7 @@ class Peak(NamedTuple):
     sigma: float
     """Standard deviation, m."""
     mass: float
-    """Integral of the density without the cut."""
+    """Integral of the density before truncation."""
 
 
 class World(NamedTuple):
@@ -63,7 +64,7 @@ class World(NamedTuple):
 
 
 def draw_world(seed: int) -> World:
-    """Draw a world, and starts of robots, by the default rules of CoverageControl.
+    """Draw a world, and starts of robots, with the default parameters of CoverageControl.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def _draw_peaks(rng: np.random.Generator) -> list[Peak]:
 
 
 def compute_density(peaks: Sequence[Peak]) -> FloatArray:
-    """Compute the mass of the peaks in each pixel, relative to the largest.
+    """Compute the density of each pixel: the mass of all peaks in it, divided by the maximum over all pixels.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def compute_density(peaks: Sequence[Peak]) -> FloatArray:
 
 
 def merge_pixels(density: FloatArray) -> FloatArray:
-    """Merge the pixels of a density to those of a map, which keep their mean.
+    """Downsample a density to the raster of a map by averaging blocks of pixels.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def build_open_square(name: str, values: FloatArray) -> Environment:
 
 
 def build_world(seed: int) -> Environment:
-    """Build the map of a world, whose density has rounded values.
+    """Build the map of a world, with its density rounded.
 
     Parameters
     ----------

@@ -23,8 +23,8 @@ shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
-If the density is unknown, no process has it: the referee measures it on behalf of that robot, within its
-sensing range.
+If the density is unknown, no process has it, except those of the controllers of CoverageControl: the referee
+measures it on behalf of that robot, within its sensing range.
 
 The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
 an empty scan. The oracle and the controllers of CoverageControl, which decide for all robots at once, have

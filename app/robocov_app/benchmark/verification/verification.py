@@ -35,7 +35,7 @@ from robocov.kernel_compilation import ALL_EXAMPLES, compile_kernels
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.controller_code import ControllerCode
-from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL, ORACLE, RatedController, Selection
+from robocov_app.benchmark.rated_controller import COVERAGE_CONTROL_FILES, ORACLE, RatedController, Selection
 from robocov_app.benchmark.references import RESTARTS
 from robocov_app.benchmark.result_checks import Row
 from robocov_app.benchmark.results import build_row, compute_gaps, read_result
@@ -359,7 +359,7 @@ def verify_result(
     verification.read_files = sorted(described.read_files)
     verification.differences += [f"its controller tried {action}" for action in described.violations]
     verification.differences += _compare_descriptions(result["entry"], {**identity, **asdict(description)})
-    verification.differences += _compare_without_running(result, rows, tasks)
+    verification.differences += _compare_without_running(rated, result, rows, tasks)
 
     sampled = _sample_runs(
         rows.keys() & tasks.keys(), options.sample, _create_generator(seed, _SAMPLE_STREAM)
@@ -473,12 +473,12 @@ def _plan_new_runs(
         return _NewRuns("--new-maps is 0")
     if rated.controller == ORACLE:
         return _NewRuns("the oracle needs their best placements, which are not known")
-    if rated.controller in COVERAGE_CONTROL:
-        return _NewRuns("controllers of CoverageControl run on the worlds of the suite only")
+    if rated.controller in COVERAGE_CONTROL_FILES:
+        return _NewRuns("no new maps are drawn on the track open-square")
     maps_by_track = {track: [study_map.name for study_map in study.maps] for track, study in studies.items()}
     track = choose_track(maps_by_track, count, rng)
     if track is None:
-        return _NewRuns("they require runs on maps of families that have a generator")
+        return _NewRuns("none of the families in the result has new maps")
     families = dict.fromkeys(suite.FAMILY_OF[name] for name in maps_by_track[track])
     new_maps = sample_new_maps(list(families), count, rng)
     stand_in = rated.replace_user_code()
@@ -633,10 +633,13 @@ def _list_new_map_differences(comparison: NewMapComparison | None) -> list[str]:
 
 
 def _compare_without_running(
-    result: Mapping[str, Any], rows: Mapping[TrackRunKey, Row], tasks: Mapping[TrackRunKey, Task]
+    rated: RatedController,
+    result: Mapping[str, Any],
+    rows: Mapping[TrackRunKey, Row],
+    tasks: Mapping[TrackRunKey, Task],
 ) -> Iterator[str]:
     """Yield the differences that can be found without any run: in versions, selected runs and gaps."""
-    versions = describe_version_differences(result["versions"])
+    versions = describe_version_differences(result["versions"], rated.list_versions())
     if versions:
         yield f"made with {versions}"
     for key in tasks:
