@@ -232,7 +232,7 @@ class ClairvoyantCvt(LibraryController):
     """Lloyd's algorithm with the true density and the positions of all robots."""
 
     name = "coverage-control-clairvoyant"
-    label = "CoverageControl, clairvoyant"
+    label = "Clairvoyant CVT"
     summary = "Lloyd's algorithm of CoverageControl with the true density and all positions"
     algorithm = "ClairvoyantCVT"
 
@@ -242,7 +242,7 @@ class CentralizedCvt(LibraryController):
     """Lloyd's algorithm with what the whole team has sensed, and the positions of all robots."""
 
     name = "coverage-control-centralized"
-    label = "CoverageControl, centralized"
+    label = "Centralized CVT"
     summary = "Lloyd's algorithm of CoverageControl with what the whole team has sensed, and all positions"
     algorithm = "CentralizedCVT"
 
@@ -252,6 +252,6 @@ class DecentralizedCvt(LibraryController):
     """Lloyd's algorithm with what each robot has sensed, and the positions in communication range."""
 
     name = "coverage-control-decentralized"
-    label = "CoverageControl, decentralized"
+    label = "Decentralized CVT"
     summary = "Lloyd's algorithm of CoverageControl with what each robot has sensed, and positions in range"
     algorithm = "DecentralizedCVT"
