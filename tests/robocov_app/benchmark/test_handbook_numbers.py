@@ -134,7 +134,6 @@ OPEN_SQUARE_ROWS = [
     for controller in (
         *COVERAGE_CONTROL_FILES,
         "exploring-lloyd",
-        "atlas-shared",
         "rapf",
         "gp-ucb",
         "lloyd",
