@@ -253,8 +253,8 @@ def test_robots_of_a_run_without_decisions_are_not_counted(
     [
         ("lloyd", 0, "--new-maps is 0"),
         (ORACLE, 5, "the oracle needs their best placements"),
-        ("coverage-control-centralized", 5, "controllers of CoverageControl run on the worlds"),
-        ("lloyd", 5, "they require runs on maps of families that have a generator"),
+        ("coverage-control-centralized", 5, "no new maps are drawn on the track open-square"),
+        ("lloyd", 5, "none of the families in the result has new maps"),
     ],
 )
 def test_the_reason_for_no_new_maps_is_reported(controller: str, count: int, expected: str) -> None:

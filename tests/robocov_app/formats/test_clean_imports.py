@@ -312,7 +312,7 @@ def test_widths_of_stretched_strokes_are_those_of_the_walls(tmp_path: Path) -> N
     line = '<g transform="scale(2 1)"><path d="M10 10V90" stroke="#000" stroke-width="2" fill="none"/></g>'
     (tmp_path / "pen.svg").write_text(SVG.format(100, line))
     _, report, _ = import_map(tmp_path / "pen.svg", options=ReadOptions(scale=0.1))
-    assert any("treated as walls, 0.4 m wide" in note for note in report.notes)
+    assert any("treated as a wall, 0.4 m wide" in note for note in report.notes)
 
 
 def test_no_gap_is_at_minus_zero() -> None:
