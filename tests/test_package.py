@@ -27,7 +27,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 DESCRIPTION = (ROOT / PROJECT["readme"]).read_text(encoding="utf-8")
 EXTRAS = PROJECT["optional-dependencies"]
 EXTRAS_FOR_DEVELOPERS = {"all", "test", "bench", "coverage-control"}
-MAX_ARCHIVE_BYTES = 6_000_000
+MAX_ARCHIVE_BYTES = 6_500_000
 MAX_ARCHIVED_FILE_BYTES = 250_000
 MAX_WHEEL_BYTES = 7_000_000
 
