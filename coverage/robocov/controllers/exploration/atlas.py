@@ -455,7 +455,7 @@ class Atlas(BaseController):
     ) -> tuple[PlannerState, FloatArray]:
         """Return the state of a robot after the plan for its team, and the point to which it moves next."""
         position = seen.positions[robot]
-        viewpoint = None if previous.motion is None else previous.motion.viewpoint
+        viewpoint = previous.viewpoint
         own = self._find_own_goal(state, seen, cooperation)
         if own is None:
             return replace(state, motion=OwnMotion(position, viewpoint)), position
@@ -508,9 +508,8 @@ class Atlas(BaseController):
         on a path to a viewpoint.
         """
         assert state.basis is not None
-        is_heading_for_viewpoint = state.motion is not None and state.motion.viewpoint is not None
         is_away_from_goal = math.dist(own.goal, position) > _ARRIVAL_RADIUS_M
-        if is_away_from_goal and not is_heading_for_viewpoint:
+        if is_away_from_goal and state.viewpoint is None:
             return OwnMotion(own.goal)
         viewpoint = None
         node = state.basis.planner.visibility.find_entry_node(position)
@@ -533,10 +532,8 @@ class Atlas(BaseController):
         planner = state.basis.planner
         # The longer the path to viewpoints already is, the more must be gained from another one.
         patience = self.patience * (_SHARED_PATIENCE_FACTOR if cooperation.is_agreed else 1.0)
-        doubling_length = patience * state.known_map.raster.region.diameter
-        doublings = min(state.path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
         costs = compute_patch_costs(planner.map_window, own.cell_distances, density)
-        min_cost = self.stake * own.cost * 2.0**doublings
+        min_cost = self.stake * own.cost * _compute_path_factor(state, patience)
         costs[costs <= min_cost] = 0.0
         path_lengths = planner.graph.get_distances(node)
         viewpoint = find_viewpoint(planner.map_window, costs, path_lengths, state.path.viewpoints)
@@ -562,18 +559,17 @@ class Atlas(BaseController):
         continue. Robots that all plan on the same map need not wait.
         """
         assert state.basis is not None
-        is_heading_for_viewpoint = state.motion is not None and state.motion.viewpoint is not None
-        if not (cooperation.is_agreed or state.basis.is_quiet or is_heading_for_viewpoint):
+        may_go = cooperation.is_agreed or state.basis.is_quiet or state.viewpoint is not None
+        if not may_go:
             return None
         planner = state.basis.planner
         other_positions = _predict_other_positions(state, cooperation)
-        doubling_length = _POSSIBLE_SAVING_DOUBLING_LENGTH * state.known_map.raster.region.diameter
-        doublings = min(state.path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
+        path_factor = _compute_path_factor(state, _POSSIBLE_SAVING_DOUBLING_LENGTH)
         savings = compute_possible_savings(
             planner,
             planner.compute_distances_from(np.vstack([own.goal, other_positions])),
             density,
-            min_saving=_MIN_POSSIBLE_SAVING * own.cost * 2.0**doublings,
+            min_saving=_MIN_POSSIBLE_SAVING * own.cost * path_factor,
         )
         # If no known free space connects another robot with this one, the path between them may be blocked.
         # The other robot then does not count as closer.
@@ -585,6 +581,16 @@ class Atlas(BaseController):
         is_closest = path_lengths < other_distances
         own_path_lengths = np.where(is_closest, path_lengths, np.inf)
         return find_viewpoint(planner.map_window, savings, own_path_lengths, state.path.viewpoints)
+
+
+def _compute_path_factor(state: PlannerState, doubling_length: float) -> float:
+    """Return the factor by which the path to viewpoints has raised what must be gained from another one.
+
+    It is 1 at first, and doubles with each `doubling_length`, in diameters of the region.
+    """
+    diameter = state.known_map.raster.region.diameter
+    doublings = min(state.path.viewpoint_length / (doubling_length * diameter), _MAX_DOUBLINGS)
+    return float(2.0**doublings)
 
 
 def _predict_other_positions(state: PlannerState, cooperation: Cooperation) -> FloatArray:
@@ -640,7 +646,7 @@ def _extend_viewpoint_path(state: PlannerState, position: FloatArray, added_leng
     If the robot was heading for a viewpoint, the length of the move, `added_length` in meters, is added to
     the path length spent on viewpoints, and the viewpoint is recorded if the robot has reached it.
     """
-    viewpoint = None if state.motion is None else state.motion.viewpoint
+    viewpoint = state.viewpoint
     if viewpoint is None:
         return state.path
     viewpoints = state.path.viewpoints

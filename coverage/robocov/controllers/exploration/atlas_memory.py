@@ -112,6 +112,11 @@ class PlannerState:
     """Result of the later stages of the last plan; None before the first plan."""
     jam: JamState = JamState()
 
+    @property
+    def viewpoint(self) -> FloatArray | None:
+        """The viewpoint to which the robot moves, (2,) m; None if it does not move to any."""
+        return None if self.motion is None else self.motion.viewpoint
+
     def __deepcopy__(self, memo: object) -> PlannerState:
         # Copies share the object, because it never changes.
         return self
