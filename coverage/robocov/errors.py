@@ -304,8 +304,8 @@ def quote_json(value: object) -> str:
     Parameters
     ----------
     value : object
-        The value to show. Parts that JSON cannot represent are formatted by `quote`, as is the whole value if
-        it has such keys or contains itself.
+        The value to show. Parts that JSON cannot represent are formatted by `quote`. If a key cannot be
+        represented, or the value contains itself, the whole value is formatted by `quote`.
 
     Returns
     -------

@@ -135,13 +135,15 @@ class LibraryRun:
         velocities : (n, 2) array, m/s
         goals : (n, 2) array, m
         """
+        # Restart unless the history continues the positions that the library has already received.
         if self._received is None or not np.array_equal(self._received, history[: len(self._received)]):
             self._start(history[0])
             self._received = history[:1]
         for positions in history[len(self._received) :]:
             self._system.SetGlobalRobotPositions(self._library.PointVector(list(positions)))
         self._received = history
-        # The result depends only on the state of the system, so the computation may be repeated.
+        # If the history has not changed, the result is the same as before, because it depends only on the
+        # state of the system.
         self._controller.ComputeActions()
         velocities = np.array(list(self._controller.GetActions()), dtype=float).reshape(-1, 2)
         goals = np.array(list(self._controller.GetGoals()), dtype=float).reshape(-1, 2)

@@ -169,7 +169,7 @@ class MapWindow:
         )
 
     def find_connected(self, positions: FloatArray) -> BoolArray:
-        """Find which positions are connected with the first one through cells known to be free.
+        """Find which positions are connected to the first one through cells known to be free.
 
         Parameters
         ----------
@@ -178,9 +178,9 @@ class MapWindow:
         Returns
         -------
         (k,) bool array
-            False for positions outside the window or in a cell that is not known to be free; False for all
-            positions if this holds for the first one. Positions outside the raster belong to its nearest
-            cell. The width of passages is ignored.
+            False for positions outside the window or in a cell that is not known to be free. If the first
+            position is one of these, all are False. A position outside the raster counts as being in the
+            nearest cell. The width of passages is ignored.
         """
         rows, columns = self.known_map.raster.find_cells(positions)
         rows = rows - self.window.first_row

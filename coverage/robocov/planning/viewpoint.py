@@ -91,7 +91,7 @@ def compute_patch_costs(
     cell_distances : (m,) array, m
         Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
     density : Density or None
-        It is evaluated at each node; None means 1 everywhere.
+        Weight of the cells, evaluated at each node; None means 1 everywhere.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def compute_possible_savings(
     nearest_distances : (m,) array, m
         Distance from each node to the nearest robot; infinite if no robot can reach it.
     density : Density or None
-        It is evaluated at each node; None means 1 everywhere.
+        Weight of the cells, evaluated at each node; None means 1 everywhere.
     min_saving : float
         Savings count only if they exceed this value, in cells times meters.
 
@@ -139,12 +139,12 @@ def compute_possible_savings(
 
     Notes
     -----
-    The expected cost (`compute_patch_costs`) is small for space among walls, because it may be the inside of
-    an obstacle. It may also be a winding corridor whose entrance alone is visible. The possible saving is
-    then large: the decrease of the sum, over all cells of the patch, of the density times the distance to the
-    nearest robot when one more robot is placed in the patch. Only some positions are tried for this robot, so
-    the result may be slightly too low. Distances through unknown cells include the detour that `LatticeGraph`
-    assumes.
+    The expected cost (`compute_patch_costs`) of space among walls is small, because the space may be the
+    inside of an obstacle. But it may also be a winding corridor, and only its entrance is visible. In that
+    case, the possible saving is large: the decrease of the sum, over all cells of the patch, of the density
+    times the distance to the nearest robot when one more robot is placed in the patch. Only some positions
+    are tried for this robot, so the result may be slightly too low. Distances through unknown cells include
+    the detour that `LatticeGraph` assumes.
     """
     map_window = planner.map_window
     unknown = map_window.unknown_area

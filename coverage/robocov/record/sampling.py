@@ -35,7 +35,7 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     Parameters
     ----------
     time : (T,) array, s
-        Times of the steps, ascending. Multiples of 1/rate count from the first one.
+        Times of the steps, ascending. Multiples of 1/rate are measured from the first time.
     rate : float, Hz
         Number of steps to select per second; 0 selects only the first and the last one.
 
@@ -59,10 +59,12 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     last = len(time) - 1
     min_step = float(np.diff(time).min(initial=np.inf))
     if min_step * rate >= 1.0:
+        # All steps are selected, whatever the rounding of the midpoints.
         return np.arange(last + 1)
     periods = (time - time[0]) * rate
     midpoints = np.round((periods[:-1] + periods[1:]) / 2.0, _TIE_DECIMALS)
-    # A step is nearest to the multiples above the midpoint before it, up to the midpoint after it.
+    # A step is nearest to every multiple between the midpoint before it (exclusive) and the midpoint after it
+    # (inclusive). There is one if the last multiple up to the midpoint has increased.
     last_multiples = np.floor(midpoints)
     is_nearest = np.diff(last_multiples, prepend=-1.0) > 0.0
     return np.union1d(np.flatnonzero(is_nearest), [0, last])

@@ -545,7 +545,7 @@ class _DistanceSampler:
         self._radius = 0.0
 
     def update(self) -> None:
-        """Add the mean distance at the present step if one is due."""
+        """Add the mean distance at the current step if one is due."""
         timeline = self._session.timeline
         pane = timeline.panes[0]
         curve = pane.distance_curve
@@ -557,7 +557,7 @@ class _DistanceSampler:
             curve.add(timeline.end_time, result.mean_distance)
 
     def _get_cost(self) -> TimeVaryingCost:
-        """Return the cost on the present map, which is built again when the map or the team changes."""
+        """Return the cost on the current map; rebuild it if the map or the smallest radius has changed."""
         environment = self._session.displayed.environment
         radius = min(pane.setup.team.min_radius for pane in self._session.timeline.panes)
         if self._cost is None or environment is not self._environment or radius != self._radius:

@@ -223,7 +223,8 @@ def _find_outermost_outlines(drawing: Drawing) -> Boundary | None:
     if not is_inner.any() and len(areas) > 1:
         return None
     outermost = np.array(drawing.outlines, dtype=object)[~is_inner].tolist()
-    # The outline with the largest filled area may lie in another one: walls around a floor, for example.
+    # The outline with the largest filled area may lie inside another one, such as a floor inside a thin ring
+    # of walls.
     largest = max(outermost, key=lambda outline: outline.filled_area)
     return _join_outlines(drawing, largest, set(outermost))
 
