@@ -71,8 +71,10 @@ class FrontierMedian(SharedMapController):
     Every exploration therefore comes to an end. Targets closer than 0.5 m to each other count as one.
     Robots do not wait for frontiers that only robots out of range could reach.
 
-    Robots do not tell each other which targets they have visited, so their plans can differ. With a limited
-    communication range, they may leave the last targets to each other until these are given up.
+    *Reports of visits.* With a limited communication range, robots plan for different groups, and do not end
+    the same visits. They might then leave a target to a robot that has already been there. After each plan, a
+    robot therefore sends the targets of all visits that are over, its own and those that others have reported.
+    Robots that are all in range of each other need no reports, unless one of them has just come into range.
     """
 
     name = "frontier-median"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -14,7 +15,7 @@ from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Informati
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.exploration.scan_exchange import ScanExchange
-from robocov.controllers.exploration.visits import Visits
+from robocov.controllers.exploration.visits import NO_TARGETS, Visits, receive_reported_targets
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.density import Density
 from robocov.k_median import run_lloyd
@@ -61,6 +62,12 @@ class Group(NamedTuple):
     def is_in_range(self) -> BoolArray:
         """Whether the position of each robot is known at present rather than assumed, (k,)."""
         return np.asarray(self.message_times == self.time)
+
+    def has_new_neighbor(self, previous: Group) -> bool:
+        """Return whether a robot is in range that was not in range in a previous group."""
+        neighbors = self.robots[self.is_in_range]
+        previous_neighbors = previous.robots[previous.is_in_range]
+        return bool((~np.isin(neighbors, previous_neighbors)).any())
 
     def match(self, other: Group) -> tuple[IntArray, IntArray]:
         """Find the robots that are in both of two groups.
@@ -111,6 +118,14 @@ class Plan:
     """The map for which it was made."""
     planner: GridPlanner
     density: Density | None
+
+    def add_reported_visits(self, targets: FloatArray) -> Plan:
+        """Return the plan with the visits to targets, (t, 2) m, that other robots have reported as over."""
+        visits = self.placement.visits
+        if visits is None or len(targets) == 0:
+            return self
+        placement = self.placement._replace(visits=visits.add_reported(targets))
+        return replace(self, placement=placement)
 
     def __deepcopy__(self, memo: object) -> Plan:
         # Copies share the object, because it never changes.
@@ -298,6 +313,8 @@ class SharedMapMemory:
     """Waypoints of each robot, (w, 2) m. The last one is its goal. Empty before the first plan."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
+    reported_targets: tuple[FloatArray, ...]
+    """Targets, (t, 2) m, of visits that others have reported to each robot as over since its last plan."""
     next_plan_time: float = -math.inf
     """Time at which all robots plan next, s."""
     returns: FloatArray | None = None
@@ -360,15 +377,19 @@ class SharedMapController(BaseController):
             plans=(None,) * n,
             routes=(),
             waypoint_indices=np.zeros(n, dtype=np.intp),
+            reported_targets=(NO_TARGETS,) * n,
         )
 
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
         """Compute the forces along the routes to the robots' own goals in their plans."""
         exchange = memory.exchange.receive(seen)
+        if seen.messages:
+            memory = replace(memory, reported_targets=_receive_reports(seen, memory.reported_targets))
         # Scans arrive one step after they are taken, so robots plan one step after each scan.
         if exchange.has_scans and seen.time >= memory.next_plan_time - TIME_TOLERANCE_S:
             exchange = exchange.update_maps(range(len(seen.positions)))
             memory = self._plan_routes(seen, replace(memory, exchange=exchange))
+            exchange = memory.exchange
         if seen.scans is not None:
             exchange = exchange.add_scans(seen, seen.scans)
         exchange, messages = exchange.send(seen)
@@ -403,9 +424,11 @@ class SharedMapController(BaseController):
             routes.append(plan.planner.find_route(seen.positions[robot], own_goal))
         return replace(
             memory,
+            exchange=_report_visits(seen, memory, plans),
             plans=plans,
             routes=tuple(routes),
             waypoint_indices=np.zeros_like(memory.waypoint_indices),
+            reported_targets=(NO_TARGETS,) * len(plans),
             next_plan_time=seen.time + self.period,
         )
 
@@ -421,9 +444,12 @@ class SharedMapController(BaseController):
                 max_speed=float(memory.team.max_speed[robot]),
                 sensing_range=float(memory.team.sensing_range[robot]),
             )
-            arrays = tuple(column.tobytes() for column in group)
+            reported_targets = memory.reported_targets[robot]
+            arrays = tuple(column.tobytes() for column in (*group, reported_targets))
             key = (id(known_map), id(previous_plan), limits, *arrays)
             if key not in plans_by_knowledge:
+                if previous_plan is not None:
+                    previous_plan = previous_plan.add_reported_visits(reported_targets)
                 plans_by_knowledge[key] = self._make_plan(seen, known_map, previous_plan, group, limits)
             plans.append(plans_by_knowledge[key])
         return tuple(plans)
@@ -505,3 +531,31 @@ def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, rob
         message_times = np.concatenate([message_times, previous.message_times[is_assumed]])
     order = np.argsort(robots)
     return Group(robots=robots[order], positions=positions[order], message_times=message_times[order])
+
+
+def _receive_reports(seen: Observations, reported_targets: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    """Return the targets reported to each robot, with those of the reports that arrive in this step."""
+    arrived_targets = (receive_reported_targets(seen, robot) for robot in range(len(reported_targets)))
+    return tuple(
+        # Without repetitions and in a fixed order, so that robots with equal knowledge share their plan.
+        np.unique(np.vstack([earlier, arrived]), axis=0) if len(arrived) else earlier
+        for earlier, arrived in zip(reported_targets, arrived_targets, strict=True)
+    )
+
+
+def _report_visits(seen: Observations, memory: SharedMapMemory, plans: Sequence[Plan]) -> ScanExchange:
+    """Return the exchange with the messages about visits that are over in the new plans.
+
+    Robots that receive each other's messages end the same visits in their plans, and need no messages unless
+    they have just met.
+    """
+    exchange = memory.exchange
+    for robot, (previous_plan, plan) in enumerate(zip(memory.plans, plans, strict=True)):
+        visits = plan.placement.visits
+        if previous_plan is None or visits is None or not visits.is_over.any():
+            continue
+        neighbors = seen.neighbors.list_neighbors(robot).tolist()
+        is_team_in_range = len(neighbors) == len(plans) - 1 and exchange.neighbors_reach_all(robot, neighbors)
+        if not is_team_in_range or plan.group.has_new_neighbor(previous_plan.group):
+            exchange = exchange.add_message(robot, visits.build_message())
+    return exchange

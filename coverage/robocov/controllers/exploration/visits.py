@@ -6,12 +6,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robocov.controllers.density_exchange import HEADER_BYTES
+from robocov.observation import Message, Observations
 from robocov.typing import BoolArray, FloatArray, IntArray
 
+NO_TARGETS = np.empty((0, 2))
+"""The positions of no targets."""
+TARGET_BYTES = 8
+"""Size of the position of a target in a message."""
 NO_VISIT = -1
 """Index that stands for no visit."""
 VISIT_RADIUS_M = 0.5
 """Distance below which two targets belong to the same visit."""
+
+
+class VisitReport(NamedTuple):
+    """Content of a message about the visits that are over."""
+
+    targets: FloatArray
+    """(v, 2) m, the targets of these visits."""
 
 
 class Visits(NamedTuple):
@@ -43,7 +56,7 @@ class Visits(NamedTuple):
         Visits
         """
         return cls(
-            positions=np.empty((0, 2)),
+            positions=NO_TARGETS,
             durations=np.empty(0),
             limits=np.empty(0),
             current=np.full(robot_count, NO_VISIT),
@@ -53,6 +66,11 @@ class Visits(NamedTuple):
     def is_over(self) -> BoolArray:
         """Whether each visit is over, (v,)."""
         return np.asarray(self.durations >= self.limits)
+
+    def build_message(self) -> Message:
+        """Build the message in which a robot reports the visits that are over."""
+        targets = self.positions[self.is_over]
+        return Message(VisitReport(targets), HEADER_BYTES + TARGET_BYTES * len(targets))
 
     def find_excluded(self, targets: FloatArray) -> BoolArray:
         """Find the targets that belong to visits that are over.
@@ -69,6 +87,26 @@ class Visits(NamedTuple):
         over = self.positions[self.is_over]
         squared_distances = ((targets[:, None] - over) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
         return np.asarray(squared_distances < VISIT_RADIUS_M**2)
+
+    def add_reported(self, targets: FloatArray) -> Visits:
+        """Return the visits together with those that other robots have reported as over.
+
+        Parameters
+        ----------
+        targets : (t, 2) array, m
+            Targets of the reported visits.
+
+        Returns
+        -------
+        Visits
+            Without reported visits close to one that is over already.
+        """
+        added = targets[~self.find_excluded(targets)]
+        return self._replace(
+            positions=np.vstack([self.positions, added]),
+            durations=np.append(self.durations, np.full(len(added), np.inf)),
+            limits=np.append(self.limits, np.zeros(len(added))),
+        )
 
     def stop(self, robots_on_visit: IntArray, has_arrived: BoolArray, time_spent: float) -> Visits:
         """Return the visits after some time. No robot is on a visit any more.
@@ -125,3 +163,13 @@ class Visits(NamedTuple):
         limits = visits.limits.copy()
         limits[visit] = max(limits[visit], limit)
         return visits._replace(limits=limits, current=np.where(is_visitor, visit, self.current))
+
+
+def receive_reported_targets(seen: Observations, robot: int) -> FloatArray:
+    """Return the targets in the reports of visits that a robot receives in this step, (t, 2) m."""
+    reports = [
+        message.payload.targets
+        for message in seen.get_messages(robot)
+        if isinstance(message.payload, VisitReport)
+    ]
+    return np.concatenate([NO_TARGETS, *reports])

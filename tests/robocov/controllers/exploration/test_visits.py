@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.controllers.exploration.visits import NO_VISIT, VISIT_RADIUS_M, Visits
+from robocov.controllers.exploration.visits import NO_VISIT, VISIT_RADIUS_M, VisitReport, Visits
 
 NO_ARRIVALS = np.zeros(2, dtype=bool)
 
@@ -57,3 +57,31 @@ def test_a_target_close_to_an_earlier_one_continues_the_visit() -> None:
     assert visits.limits.tolist() == [5.0]
     visits = visits.start(np.array([3.0, 1.0]), np.array([False, True]), limit=2.0)
     assert visits.current.tolist() == [0, 1]
+
+
+def test_messages_contain_only_visits_that_are_over() -> None:
+    visits = start_visit()
+    visits = visits.stop(visits.current, has_arrived=np.array([False, True]), time_spent=1.0)
+    visits = visits.start(np.array([4.0, 5.0]), np.array([False, True]), limit=5.0)
+    message = visits.build_message()
+    assert isinstance(message.payload, VisitReport)
+    assert message.payload.targets.tolist() == [[1.0, 1.0]]
+    assert message.size == 12
+
+
+def test_reported_visits_are_over_and_change_no_others() -> None:
+    visits = start_visit().add_reported(np.array([[3.0, 1.0]]))
+    assert visits.is_over.tolist() == [False, True]
+    assert visits.current.tolist() == [NO_VISIT, 0]
+    assert visits.find_excluded(np.array([[1.0, 1.0], [3.2, 1.0]])).tolist() == [False, True]
+
+
+def test_a_visit_is_over_if_others_report_it() -> None:
+    visits = start_visit().add_reported(np.array([[1.1, 1.0]]))
+    assert visits.find_excluded(np.array([[1.0, 1.0]])).tolist() == [True]
+
+
+def test_reported_visits_that_are_over_already_are_not_added() -> None:
+    visits = start_visit().add_reported(np.array([[3.0, 1.0]]))
+    same = visits.add_reported(np.array([[3.0, 1.0 + 0.9 * VISIT_RADIUS_M]]))
+    assert same.positions.tolist() == visits.positions.tolist()
