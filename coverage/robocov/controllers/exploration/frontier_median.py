@@ -72,9 +72,9 @@ class FrontierMedian(SharedMapController):
     Robots do not wait for frontiers that only robots out of range could reach.
 
     *Reports of visits.* With a limited communication range, robots plan for different groups, and do not end
-    the same visits. They might then leave a target to a robot that has already been there. After each plan, a
-    robot therefore sends the targets of all visits that are over, its own and those that others have reported.
-    Robots that are all in range of each other need no reports, unless one of them has just come into range.
+    the same visits. They might then leave a target to a robot that has already been there. Therefore, a robot
+    sends the targets of all visits that are over after each plan: its own, and those that others have reported
+    to it. Robots that are all in range of each other need no reports unless one has just come into range.
     """
 
     name = "frontier-median"
