@@ -71,10 +71,10 @@ class FrontierMedian(SharedMapController):
     Every exploration therefore comes to an end. Targets closer than 0.5 m to each other count as one.
     Robots do not wait for frontiers that only robots out of range could reach.
 
-    *Reports of visits.* With a limited communication range, robots plan for different groups, and do not end
-    the same visits. They might then leave a target to a robot that has already been there. Therefore, a robot
-    sends the targets of all visits that are over after each plan: its own, and those that others have reported
-    to it. Robots that are all in range of each other need no reports unless one has just come into range.
+    *Reports of visits.* With a limited communication range, robots plan for different groups, and different
+    visits are over in their plans. They might then leave a target to a robot that has already been there.
+    After each plan, a robot therefore reports all visits that it knows to be over. Robots that are all in
+    range of each other need no reports unless one of them has just come into range.
     """
 
     name = "frontier-median"
