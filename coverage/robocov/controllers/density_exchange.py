@@ -20,12 +20,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.observation import Message, Observations
+from robocov.observation.messages import HEADER_BYTES
 from robocov.observation.neighbors import Neighbors
 from robocov.team import Team
 from robocov.typing import BoolArray, FloatArray, IntArray
 
-HEADER_BYTES = 4
-"""Size of the index of the sender, at the start of a message."""
 PARAMETER_BYTES = 8
 """Size of a parameter."""
 MEASUREMENT_BYTES = 10

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 
 from robocov.errors import ParameterError, is_number, quote
 
+HEADER_BYTES = 4
+"""Size of the index of the sender, at the start of a message."""
 MAX_MESSAGE_BYTES = 10**9
 """Maximum size of a message."""
 

@@ -65,16 +65,17 @@ class FrontierMedian(SharedMapController):
     robot stays where it is if the targets of robots in range leave no utility for it; in the paper, it moves
     to a target even then. With unlimited communication, staying saves path length.
 
-    *End of exploration.* A target is not visited again after a robot has been there. Only robots in range
-    count, because robots out of range may never have arrived. A target is given up when robots in range have
-    headed for it for longer than 3 s plus twice the time that the nearest of them needs at its maximum speed.
-    Every exploration therefore comes to an end. Targets closer than 0.5 m to each other count as one.
-    Robots do not wait for frontiers that only robots out of range could reach.
+    *End of exploration.* A target is not visited again after a robot has been there. Robots out of range do
+    not count, because they may never have arrived. A target is given up when robots in range have headed for
+    it for longer than 3 s plus twice the time that the nearest of them would need at the maximum speed of the
+    robot that plans. Every exploration therefore comes to an end. Targets closer than 0.5 m to each other
+    count as one. Robots do not wait for frontiers that only robots out of range could reach.
 
-    *Reports of visits.* With a limited communication range, robots plan for different groups, and different
-    visits are over in their plans. They might then leave a target to a robot that has already been there.
-    After each plan, a robot therefore reports all visits that it knows to be over. Robots that are all in
-    range of each other need no reports unless one of them has just come into range.
+    *Reports of visits.* With a limited communication range, robots make different plans. One of them may not
+    know that another has already visited a target or given it up, and would wait for it to go there. After
+    each plan, a robot therefore reports the targets of all visits that it knows to be over, including those
+    that others have reported to it. While the whole team is in range of each other, it sends no reports,
+    unless a robot has just come into range.
     """
 
     name = "frontier-median"

@@ -15,7 +15,7 @@ from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Informati
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.exploration.scan_exchange import ScanExchange
-from robocov.controllers.exploration.visits import NO_TARGETS, Visits, receive_reported_targets
+from robocov.controllers.exploration.visits import NO_TARGETS, Visits, extract_reported_targets
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.density import Density
 from robocov.k_median import run_lloyd
@@ -64,10 +64,10 @@ class Group(NamedTuple):
         return np.asarray(self.message_times == self.time)
 
     def has_new_neighbor(self, previous: Group) -> bool:
-        """Return whether a robot is in range that was not in range in a previous group."""
-        neighbors = self.robots[self.is_in_range]
-        previous_neighbors = previous.robots[previous.is_in_range]
-        return bool((~np.isin(neighbors, previous_neighbors)).any())
+        """Return whether a robot has come into range since a previous plan was made for its group."""
+        robots_in_range = self.robots[self.is_in_range]
+        earlier_robots_in_range = previous.robots[previous.is_in_range]
+        return len(np.setdiff1d(robots_in_range, earlier_robots_in_range)) > 0
 
     def match(self, other: Group) -> tuple[IntArray, IntArray]:
         """Find the robots that are in both of two groups.
@@ -120,7 +120,7 @@ class Plan:
     density: Density | None
 
     def add_reported_visits(self, targets: FloatArray) -> Plan:
-        """Return the plan with the visits to targets, (t, 2) m, that other robots have reported as over."""
+        """Return the plan in which visits to targets, (t, 2) m, are over because other robots reported it."""
         visits = self.placement.visits
         if visits is None or len(targets) == 0:
             return self
@@ -314,7 +314,8 @@ class SharedMapMemory:
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
     reported_targets: tuple[FloatArray, ...]
-    """Targets, (t, 2) m, of visits that others have reported to each robot as over since its last plan."""
+    """Targets, (t, 2) m, of visits that other robots have reported to each robot as over since its last plan.
+    The robot did not know that they are over."""
     next_plan_time: float = -math.inf
     """Time at which all robots plan next, s."""
     returns: FloatArray | None = None
@@ -384,11 +385,12 @@ class SharedMapController(BaseController):
         """Compute the forces along the routes to the robots' own goals in their plans."""
         exchange = memory.exchange.receive(seen)
         if seen.messages:
-            memory = replace(memory, reported_targets=_receive_reports(seen, memory.reported_targets))
+            memory = replace(memory, reported_targets=_collect_reported_targets(seen, memory))
         # Scans arrive one step after they are taken, so robots plan one step after each scan.
         if exchange.has_scans and seen.time >= memory.next_plan_time - TIME_TOLERANCE_S:
             exchange = exchange.update_maps(range(len(seen.positions)))
             memory = self._plan_routes(seen, replace(memory, exchange=exchange))
+            # Robots may report visits after they have planned.
             exchange = memory.exchange
         if seen.scans is not None:
             exchange = exchange.add_scans(seen, seen.scans)
@@ -424,7 +426,7 @@ class SharedMapController(BaseController):
             routes.append(plan.planner.find_route(seen.positions[robot], own_goal))
         return replace(
             memory,
-            exchange=_report_visits(seen, memory, plans),
+            exchange=_add_visit_reports(seen, memory, plans),
             plans=plans,
             routes=tuple(routes),
             waypoint_indices=np.zeros_like(memory.waypoint_indices),
@@ -448,9 +450,8 @@ class SharedMapController(BaseController):
             arrays = tuple(column.tobytes() for column in (*group, reported_targets))
             key = (id(known_map), id(previous_plan), limits, *arrays)
             if key not in plans_by_knowledge:
-                if previous_plan is not None:
-                    previous_plan = previous_plan.add_reported_visits(reported_targets)
-                plans_by_knowledge[key] = self._make_plan(seen, known_map, previous_plan, group, limits)
+                informed_plan = previous_plan and previous_plan.add_reported_visits(reported_targets)
+                plans_by_knowledge[key] = self._make_plan(seen, known_map, informed_plan, group, limits)
             plans.append(plans_by_knowledge[key])
         return tuple(plans)
 
@@ -533,29 +534,36 @@ def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, rob
     return Group(robots=robots[order], positions=positions[order], message_times=message_times[order])
 
 
-def _receive_reports(seen: Observations, reported_targets: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return the targets reported to each robot, with those of the reports that arrive in this step."""
-    arrived_targets = (receive_reported_targets(seen, robot) for robot in range(len(reported_targets)))
-    return tuple(
-        # Without repetitions and in a fixed order, so that robots with equal knowledge share their plan.
-        np.unique(np.vstack([earlier, arrived]), axis=0) if len(arrived) else earlier
-        for earlier, arrived in zip(reported_targets, arrived_targets, strict=True)
-    )
+def _collect_reported_targets(seen: Observations, memory: SharedMapMemory) -> tuple[FloatArray, ...]:
+    """Return the reported targets of each robot, with the new ones in reports that arrive in this step."""
+    collected = []
+    for robot, (plan, earlier_targets) in enumerate(zip(memory.plans, memory.reported_targets, strict=True)):
+        targets = extract_reported_targets(seen, robot)
+        visits = None if plan is None else plan.placement.visits
+        if visits is not None and len(targets) > 0:
+            new_targets = visits.select_new(targets)
+            # Without repetitions and in ascending order, whichever report arrived first: robots with equal
+            # knowledge share one plan.
+            collected.append(np.unique(np.vstack([earlier_targets, new_targets]), axis=0))
+        else:
+            collected.append(earlier_targets)
+    return tuple(collected)
 
 
-def _report_visits(seen: Observations, memory: SharedMapMemory, plans: Sequence[Plan]) -> ScanExchange:
-    """Return the exchange with the messages about visits that are over in the new plans.
+def _add_visit_reports(seen: Observations, memory: SharedMapMemory, plans: Sequence[Plan]) -> ScanExchange:
+    """Return the exchange with reports of the visits that are over in the new plans.
 
-    Robots that receive each other's messages end the same visits in their plans, and need no messages unless
-    they have just met.
+    While all robots are in range of each other, they make the same plans unless messages are lost or late.
+    They then send reports only after a robot has come into range.
     """
     exchange = memory.exchange
     for robot, (previous_plan, plan) in enumerate(zip(memory.plans, plans, strict=True)):
         visits = plan.placement.visits
+        # In a first plan, no visit is over.
         if previous_plan is None or visits is None or not visits.is_over.any():
             continue
         neighbors = seen.neighbors.list_neighbors(robot).tolist()
         is_team_in_range = len(neighbors) == len(plans) - 1 and exchange.neighbors_reach_all(robot, neighbors)
         if not is_team_in_range or plan.group.has_new_neighbor(previous_plan.group):
-            exchange = exchange.add_message(robot, visits.build_message())
+            exchange = exchange.add_message(robot, visits.build_report())
     return exchange

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.controllers.density_exchange import HEADER_BYTES
 from robocov.controllers.exploration.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S
 from robocov.observation import Message, Observations
+from robocov.observation.messages import HEADER_BYTES
 from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
 

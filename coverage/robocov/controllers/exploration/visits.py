@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.controllers.density_exchange import HEADER_BYTES
 from robocov.observation import Message, Observations
+from robocov.observation.messages import HEADER_BYTES
 from robocov.typing import BoolArray, FloatArray, IntArray
 
 NO_TARGETS = np.empty((0, 2))
-"""The positions of no targets."""
+"""An empty array of targets."""
 TARGET_BYTES = 8
-"""Size of the position of a target in a message."""
+"""Size of a target in a message: 4 bytes for each coordinate."""
 NO_VISIT = -1
 """Index that stands for no visit."""
 VISIT_RADIUS_M = 0.5
@@ -21,25 +21,26 @@ VISIT_RADIUS_M = 0.5
 
 
 class VisitReport(NamedTuple):
-    """Content of a message about the visits that are over."""
+    """Content of a message about the visits that the sender knows to be over."""
 
     targets: FloatArray
-    """(v, 2) m, the targets of these visits."""
+    """(t, 2) m, their targets."""
 
 
 class Visits(NamedTuple):
     """Visits of the k robots of a group to targets on frontiers. Immutable.
 
-    A visit is over after an arrival, or when robots have headed for its target for a limited time. The visits
-    that are over are remembered as well, so that no robot visits their targets again.
+    A visit is over after an arrival, when robots have headed for its target for a limited time, or when
+    another robot reports that it is over. The visits that are over are remembered as well, so that no robot
+    visits their targets again.
     """
 
     positions: FloatArray
     """(v, 2) m, the first target of each visit. Later targets close to it belong to the same visit."""
     durations: FloatArray
-    """(v,) s, time for which robots have headed for the target. Infinite after an arrival."""
+    """(v,) s, time for which robots have headed for the target. Infinite after an arrival or a report."""
     limits: FloatArray
-    """(v,) s, time after which the target is given up."""
+    """(v,) s, time after which the target is given up; 0 for visits that other robots reported."""
     current: IntArray
     """(k,) Index of the visit that each robot is on, or `NO_VISIT`."""
 
@@ -67,8 +68,14 @@ class Visits(NamedTuple):
         """Whether each visit is over, (v,)."""
         return np.asarray(self.durations >= self.limits)
 
-    def build_message(self) -> Message:
-        """Build the message in which a robot reports the visits that are over."""
+    def build_report(self) -> Message:
+        """Build the message in which a robot reports the visits that are over.
+
+        Returns
+        -------
+        Message
+            With a `VisitReport` as its payload.
+        """
         targets = self.positions[self.is_over]
         return Message(VisitReport(targets), HEADER_BYTES + TARGET_BYTES * len(targets))
 
@@ -88,8 +95,23 @@ class Visits(NamedTuple):
         squared_distances = ((targets[:, None] - over) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
         return np.asarray(squared_distances < VISIT_RADIUS_M**2)
 
+    def select_new(self, targets: FloatArray) -> FloatArray:
+        """Select the targets of which no visit is known to be over.
+
+        Parameters
+        ----------
+        targets : (t, 2) array, m
+
+        Returns
+        -------
+        (s, 2) array, m
+        """
+        over = self.positions[self.is_over]
+        is_known = (targets[:, None] == over).all(axis=2).any(axis=1)
+        return np.asarray(targets[~is_known])
+
     def add_reported(self, targets: FloatArray) -> Visits:
-        """Return the visits together with those that other robots have reported as over.
+        """Return the visits together with visits that other robots have reported as over.
 
         Parameters
         ----------
@@ -99,13 +121,13 @@ class Visits(NamedTuple):
         Returns
         -------
         Visits
-            Without reported visits close to one that is over already.
+            The indices of earlier visits stay the same.
         """
-        added = targets[~self.find_excluded(targets)]
+        count = len(targets)
         return self._replace(
-            positions=np.vstack([self.positions, added]),
-            durations=np.append(self.durations, np.full(len(added), np.inf)),
-            limits=np.append(self.limits, np.zeros(len(added))),
+            positions=np.vstack([self.positions, targets]),
+            durations=np.append(self.durations, np.full(count, np.inf)),
+            limits=np.append(self.limits, np.zeros(count)),
         )
 
     def stop(self, robots_on_visit: IntArray, has_arrived: BoolArray, time_spent: float) -> Visits:
@@ -165,8 +187,19 @@ class Visits(NamedTuple):
         return visits._replace(limits=limits, current=np.where(is_visitor, visit, self.current))
 
 
-def receive_reported_targets(seen: Observations, robot: int) -> FloatArray:
-    """Return the targets in the reports of visits that a robot receives in this step, (t, 2) m."""
+def extract_reported_targets(seen: Observations, robot: int) -> FloatArray:
+    """Extract the targets from the reports of visits that reach a robot in a step.
+
+    Parameters
+    ----------
+    seen : Observations
+    robot : int
+        Index of the receiver.
+
+    Returns
+    -------
+    (t, 2) array, m
+    """
     reports = [
         message.payload.targets
         for message in seen.get_messages(robot)

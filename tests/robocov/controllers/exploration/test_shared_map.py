@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -23,14 +22,14 @@ from robocov.controllers.exploration.shared_map import (
     Situation,
     assign_goals,
 )
-from robocov.controllers.exploration.visits import VISIT_RADIUS_M, VisitReport
+from robocov.controllers.exploration.visits import VISIT_RADIUS_M
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.metrics import compute_clearances, count_contacts
-from robocov.observation import Message, Observations, ReceivedMessage, Scans
+from robocov.observation import Observations, Scans
 from robocov.observation.neighbors import Neighbors
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
@@ -267,63 +266,62 @@ def test_assumed_arrivals_end_no_visit() -> None:
 def test_targets_reported_by_others_are_not_visited() -> None:
     situation = build_situation(build_state_with_unknown_sides(), THREE_ROBOTS)
     first = FrontierMedian().compute_placement(situation)
+    target = first.goals[0]
     later = continue_situation(situation, first, situation.positions, [1.0, 1.0, 1.0])
     assert later.previous_plan is not None
-    informed = later._replace(previous_plan=later.previous_plan.add_reported_visits(first.goals[:1]))
+    informed = later._replace(previous_plan=later.previous_plan.add_reported_visits(target[None]))
     goals = FrontierMedian().compute_placement(later).goals
     informed_goals = FrontierMedian().compute_placement(informed).goals
-    assert np.hypot(*(goals - first.goals[0]).T).min() < VISIT_RADIUS_M
-    assert np.hypot(*(informed_goals - first.goals[0]).T).min() >= VISIT_RADIUS_M
+    assert np.hypot(*(goals - target).T).min() < VISIT_RADIUS_M
+    assert np.hypot(*(informed_goals - target).T).min() >= VISIT_RADIUS_M
 
 
-def list_reported_targets(simulation: Simulation, duration: float) -> list[set[tuple[float, float]]]:
-    """Return the targets of all visits that each robot reports as over while a simulation runs."""
-    targets: list[set[tuple[float, float]]] = [set() for _ in simulation.positions]
-    end = simulation.time + duration
-    while simulation.time < end:
-        for robot, messages in enumerate(simulation.observe_and_decide().decision.messages):
-            for message in messages:
-                if isinstance(message.payload, VisitReport):
-                    targets[robot].update(map(tuple, message.payload.targets.tolist()))
-        simulation.step()
-    return targets
+UNVISITED_TARGET = np.array([0.2, 0.2])
+"""A point that no robot visits."""
 
 
-def test_robots_in_range_of_each_other_report_no_visits() -> None:
-    simulation = build_simulation("frontier-median")
-    assert not any(list_reported_targets(simulation, 8.0))
-    visits = simulation.memory.plans[0].placement.visits
-    assert visits is not None and visits.is_over.any()
+def build_simulation_with_report(communication_range: float) -> Simulation:
+    """Return a simulation of three slow robots, of which robot 0 alone knows that a visit is over.
 
-
-def list_reporters(messages: Sequence[Sequence[Message]]) -> list[int]:
-    """Return the robots that send a report of visits that are over."""
-    return [
-        robot
-        for robot, sent in enumerate(messages)
-        if any(isinstance(message.payload, VisitReport) for message in sent)
-    ]
-
-
-def test_robots_pass_on_the_visits_that_others_report() -> None:
-    """Robot 1 is in range of robots 0 and 2, which are out of range of each other."""
+    With a communication range of 2 m, robot 1 is in range of robots 0 and 2, which are out of range of each
+    other.
+    """
     controller = make_controller("frontier-median", {"nodes": 400.0})
-    team = Team.homogeneous(3, communication_range=2.0)
+    team = Team.homogeneous(3, communication_range=communication_range, max_speed=0.02)
     starts = [[1.0, 1.0], [2.5, 1.0], [2.5, 2.5]]
     simulation = Simulation(ROOMS, controller, starts, team, dt=0.05)
     for _ in range(5):
         simulation.step()
-    target = [0.2, 0.2]
-    memory = simulation.memory
-    plans = (memory.plans[0].add_reported_visits(np.array([target])), *memory.plans[1:])
-    seen = replace(simulation.observe_and_decide().seen, time=2.0, messages=())
-    first = controller.decide(seen, replace(memory, plans=plans))
-    assert list_reporters(first.messages) == [0]
-    received = [ReceivedMessage(0, message.payload) for message in first.messages[0]]
-    second = controller.decide(replace(seen, time=4.0, messages=((), received, ())), first.memory)
-    assert list_reporters(second.messages) == [0, 1]
-    visits = [plan.placement.visits.find_excluded(np.array([target]))[0] for plan in second.memory.plans]
-    assert visits == [True, True, False]
+    plans = list(simulation.memory.plans)
+    plans[0] = plans[0].add_reported_visits(UNVISITED_TARGET[None])
+    simulation.memory = replace(simulation.memory, plans=tuple(plans))
+    return simulation
+
+
+def list_informed_robots(simulation: Simulation, time: float) -> list[int]:
+    """Return the indices of the robots that know at a later time that the visit is over."""
+    while simulation.time < time:
+        simulation.step()
+    visits = [plan.placement.visits for plan in simulation.memory.plans]
+    return [robot for robot in range(3) if visits[robot].find_excluded(UNVISITED_TARGET[None])[0]]
+
+
+def test_robots_pass_on_the_visits_that_others_report() -> None:
+    """Robots plan after each second, and send what they know at that time."""
+    simulation = build_simulation_with_report(communication_range=2.0)
+    informed_robots = [list_informed_robots(simulation, time) for time in (1.5, 2.5, 3.5)]
+    assert informed_robots == [[0], [0, 1], [0, 1, 2]]
+
+
+def test_a_team_in_range_of_each_other_reports_visits_only_after_a_robot_has_come_into_range() -> None:
+    simulation = build_simulation_with_report(communication_range=10.0)
+    copy = simulation.copy()
+    assert list_informed_robots(simulation, 3.5) == [0]
+    plans = list(copy.memory.plans)
+    group = plans[0].group
+    plans[0] = replace(plans[0], group=group._replace(message_times=group.message_times - [0.0, 1.0, 0.0]))
+    copy.memory = replace(copy.memory, plans=tuple(plans))
+    assert list_informed_robots(copy, 3.5) == [0, 1, 2]
 
 
 def build_situation_with_short_frontier() -> Situation:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.controllers.exploration.visits import NO_VISIT, VISIT_RADIUS_M, VisitReport, Visits
+from robocov.controllers.exploration.visits import (
+    NO_VISIT,
+    TARGET_BYTES,
+    VISIT_RADIUS_M,
+    VisitReport,
+    Visits,
+)
+from robocov.observation.messages import HEADER_BYTES
 
 NO_ARRIVALS = np.zeros(2, dtype=bool)
 
@@ -59,14 +66,14 @@ def test_a_target_close_to_an_earlier_one_continues_the_visit() -> None:
     assert visits.current.tolist() == [0, 1]
 
 
-def test_messages_contain_only_visits_that_are_over() -> None:
+def test_reports_contain_only_visits_that_are_over() -> None:
     visits = start_visit()
     visits = visits.stop(visits.current, has_arrived=np.array([False, True]), time_spent=1.0)
     visits = visits.start(np.array([4.0, 5.0]), np.array([False, True]), limit=5.0)
-    message = visits.build_message()
+    message = visits.build_report()
     assert isinstance(message.payload, VisitReport)
     assert message.payload.targets.tolist() == [[1.0, 1.0]]
-    assert message.size == 12
+    assert message.size == HEADER_BYTES + TARGET_BYTES
 
 
 def test_reported_visits_are_over_and_change_no_others() -> None:
@@ -76,12 +83,13 @@ def test_reported_visits_are_over_and_change_no_others() -> None:
     assert visits.find_excluded(np.array([[1.0, 1.0], [3.2, 1.0]])).tolist() == [False, True]
 
 
-def test_a_visit_is_over_if_others_report_it() -> None:
+def test_targets_close_to_a_reported_one_are_excluded() -> None:
     visits = start_visit().add_reported(np.array([[1.1, 1.0]]))
     assert visits.find_excluded(np.array([[1.0, 1.0]])).tolist() == [True]
 
 
-def test_reported_visits_that_are_over_already_are_not_added() -> None:
+def test_only_targets_of_visits_that_are_over_are_known() -> None:
+    """A target close to a known one is new: otherwise, robots would never exclude the same targets."""
     visits = start_visit().add_reported(np.array([[3.0, 1.0]]))
-    same = visits.add_reported(np.array([[3.0, 1.0 + 0.9 * VISIT_RADIUS_M]]))
-    assert same.positions.tolist() == visits.positions.tolist()
+    targets = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 1.0 + 0.9 * VISIT_RADIUS_M]])
+    assert visits.select_new(targets).tolist() == [targets[0].tolist(), targets[2].tolist()]
