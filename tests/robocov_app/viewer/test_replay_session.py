@@ -13,6 +13,7 @@ from session_records import COUNTING, build_record, build_records, have_same_arr
 
 from robocov import run
 from robocov.conditions import Conditions
+from robocov.environment import ObstaclePath
 from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
@@ -21,6 +22,7 @@ from robocov.team import Team
 from robocov.voronoi import WeightedCells
 from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.launch import ViewerLauncher
+from robocov_app.viewer.session import recorded
 from robocov_app.viewer.session.recorded import build_replay_session, get_control_period
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
@@ -130,6 +132,28 @@ def test_the_cost_curve_is_that_of_the_file(record: Record) -> None:
     np.testing.assert_allclose(pane.distance_curve.values, 3.0 - times)
     without_costs = build_replay_session([build_saved_run(record)])
     assert len(without_costs.timeline.panes[0].distance_curve) == 0
+
+
+def test_curves_of_a_record_that_starts_later_begin_at_0_s(record: Record) -> None:
+    late_record = replace(record, time=record.time + 5.0)
+    times = np.linspace(5.0, 6.0, 11)
+    history = CostHistory(times, 8.0 - times, 10.0 - times, 0.0 * times)
+    session = build_replay_session([build_saved_run(late_record, history)])
+    assert session.timeline.end_time == 1.0
+    np.testing.assert_allclose(session.timeline.panes[0].distance_curve.times, times - 5.0, atol=1e-12)
+
+
+def test_a_record_that_needs_too_much_memory_is_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = record_run(steps=400)
+    complete_pane = replay(record).timeline.panes[0]
+    monkeypatch.setattr(recorded, "MAX_HISTORY_BYTES", 0)
+    monkeypatch.setattr(recorded, "MAX_RECORD_BYTES", 100_000)
+    session = replay(record)
+    assert session.timeline.history.thinned > 0
+    session.show_time(session.timeline.end_time)
+    np.testing.assert_array_equal(get_positions(session)[0], record.positions[-1])
+    pane = session.timeline.panes[0]
+    np.testing.assert_array_equal(pane.sensed.get_until(9.0)[0], complete_pane.sensed.get_until(9.0)[0])
 
 
 def test_the_present_of_a_record_with_one_state_is_displayed(record: Record) -> None:
@@ -295,6 +319,16 @@ def test_a_record_may_be_thinned_twice(record: Record) -> None:
 def test_uneven_times_are_rejected(record: Record) -> None:
     with pytest.raises(InputError, match=r"record.npz: time: expected times .* s apart"):
         replay(record.thin(1.0 / (7 * record.dt)))
+
+
+def test_records_that_start_later_are_rejected_if_obstacles_move(record: Record) -> None:
+    path = ObstaclePath(((4.2, 1.2), (4.8, 1.2)), 0.5)
+    pillar = replace(HALL.obstacles[0], path=path)
+    moving_record = replace(record, environment=replace(HALL, obstacles=(pillar,)))
+    assert replay(moving_record).displayed.time == 0.0
+    expected = r"saved/0: expected a start at 0 s, because obstacles move, got 5 s; --frames"
+    with pytest.raises(InputError, match=expected):
+        replay(replace(moving_record, time=record.time + 5.0))
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,9 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
         if not np.allclose(elapsed, even_times, rtol=_TIME_TOLERANCE, atol=tolerance):
             file = run.folder / RECORD_FILE
             raise InputError(f"{file}: time: expected times {record.dt:g} s apart")
+        if record.time[0] > tolerance and record.environment.has_moving_obstacles:
+            reason = f"expected a start at 0 s, because obstacles move, got {record.time[0]:g} s"
+            raise InputError(f"{run.folder}: {reason}; --frames and --video show such runs")
         idle_rows = np.flatnonzero(~record.is_working.any(axis=1))
         if len(idle_rows):
             time = record.time[idle_rows[0]]
@@ -321,15 +324,19 @@ def _restore_pane(pane: Pane, saved: SavedRun, history: RunHistory) -> None:
     record = saved.record
     pane.trail = rebuild_trail(history, pane.number)
     stride = max(1, round(STEPS_BETWEEN_SENSED_POINTS * history.dt / record.dt))
+    robot_numbers = np.array(build_roster(record).numbers)
+    # The history of a long record is thinned, so that its indices differ from those of the record.
     for index in range(0, len(record), stride):
-        numbers = history[index].states[pane.number].setup.numbers
-        points = record.obstacle_points[index][record.is_working[index]]
-        pane.sensed.add(index * record.dt, numbers, points)
+        is_working = record.is_working[index]
+        numbers = robot_numbers[is_working].tolist()
+        pane.sensed.add(index * record.dt, numbers, record.obstacle_points[index][is_working])
     if saved.history is None:
         return
+    # The session starts at 0 s, also if the simulation had run before it was recorded.
+    times = saved.history.time - record.time[0]
     values_by_quantity = {"distance": saved.history.mean_distance, "time": saved.history.mean_time}
     for quantity, values in values_by_quantity.items():
         if values is None:
             continue
-        for time, value in zip(saved.history.time, values, strict=False):
+        for time, value in zip(times, values, strict=False):
             pane.curves[quantity].add(float(time), float(value))
