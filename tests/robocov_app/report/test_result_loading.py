@@ -69,6 +69,19 @@ def test_the_folder_of_a_run_is_a_result_with_one_run(tmp_path) -> None:
     assert result.facts["duration_s"] == 6.0 and "numpy" in result.facts["versions"]
 
 
+def test_the_duration_of_a_run_that_starts_later_is_counted_from_its_start(tmp_path) -> None:
+    record = build_record(SQUARE)
+    replace(record, time=record.time + 5.0).save(tmp_path / "late")
+    assert load_result(tmp_path / "late").facts["duration_s"] == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("lengths", [["long"], [None], [True], []])
+def test_path_lengths_that_are_not_numbers_are_unknown(tmp_path, lengths) -> None:
+    build_record(SQUARE).save(tmp_path / "run", {"path_length_m": lengths})
+    (run,) = load_result(tmp_path / "run").runs
+    assert run.metrics["path_length_m"] is None
+
+
 def test_runs_of_a_comparison_have_the_same_case(tmp_path) -> None:
     save_comparison(tmp_path / "both")
     result = load_result(tmp_path / "both")

@@ -14,7 +14,7 @@ from robocov.controllers import CONTROLLERS, get_gains
 from robocov.controllers.gains import Value
 from robocov.controllers.registry import get_controller_label
 from robocov.environment import Environment
-from robocov.errors import InputError, RobocovError
+from robocov.errors import InputError, RobocovError, is_number
 from robocov.files.documents import read_document, read_json_object
 from robocov.files.result_folder import complete_commit, require_result
 from robocov.files.result_names import COMPARISON_FILE, RUN_FILE, RUNS_FOLDER, STUDY_FILE
@@ -155,8 +155,9 @@ def _build_run(saved_run: SavedRun, content: Mapping[str, Any]) -> ReportedRun:
 
 def _collect_run_facts(saved_run: SavedRun, content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the facts that all runs of a comparison have in common, from one of them."""
+    time = saved_run.record.time
     facts: dict[str, Any] = {
-        "duration_s": float(saved_run.record.time[-1]),
+        "duration_s": float(time[-1] - time[0]),
         "dt_s": saved_run.record.dt,
     }
     for name in ("lattice", "team", "versions"):
@@ -349,10 +350,9 @@ def _read_metrics(summary: Any, history: CostHistory | None) -> dict[str, float 
     metrics: dict[str, float | None] = {}
     for name in METRIC_NAMES:
         value = values.get(name)
-        if name == "path_length_m" and isinstance(value, list) and value:
+        if name == "path_length_m" and isinstance(value, list) and value and all(map(is_number, value)):
             value = sum(value) / len(value)
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        metrics[name] = value if is_number else None
+        metrics[name] = value if is_number(value) else None
     if history is None or not len(history.time):
         return metrics
     final_distance = float(history.mean_distance[-1])
