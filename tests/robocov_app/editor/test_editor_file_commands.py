@@ -242,6 +242,20 @@ def test_export_follows_the_suffix_and_asks_before_replacing(driver: EditorDrive
     assert driver.editor.has_error_message and driver.editor.dialogs.current is None
 
 
+def test_export_asks_before_it_replaces_any_of_its_files(driver: EditorDriver, tmp_path: Path) -> None:
+    image = tmp_path / "untitled.pgm"
+    image.write_text("mine")
+    driver.press_key("ctrl+e")
+    driver.press_key("ctrl+a")
+    driver.type("untitled.yaml")
+    driver.press_key("return")
+    assert get_dialog_title(driver) == "Replace the file?"
+    assert driver.editor.dialogs.current.text == f"{image} already exists."
+    assert image.read_text() == "mine" and not (tmp_path / "untitled.yaml").exists()
+    driver.press_key("r")
+    assert image.read_bytes().startswith(b"P5") and (tmp_path / "untitled.yaml").exists()
+
+
 def test_a_map_is_never_saved_under_another_formats_suffix(driver: EditorDriver, tmp_path: Path) -> None:
     driver.press_key("ctrl+s")
     driver.press_key("ctrl+a")

@@ -22,7 +22,15 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import MAX_RECENT
 from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.importing.service import Imported, ImportService
-from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect_format, export_map
+from robocov_app.formats import (
+    EXPORTERS,
+    IMPORTERS,
+    Importer,
+    WriteOptions,
+    choose_exporter,
+    detect_format,
+    export_map,
+)
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.dialogs import Option, create_file_choice, create_list_choice
@@ -290,10 +298,14 @@ class FileCommands:
         self.ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
 
     def _export(self, path: Path, *, overwrites: bool = False) -> str | None:
-        if path.exists() and not overwrites:
+        # Some formats write further files, such as the image of a ROS map.
+        files_to_write = choose_exporter(path).list_files(path, WriteOptions())
+        existing_files = [str(file) for file in files_to_write if file.exists()]
+        if existing_files and not overwrites:
             another_name = ("Another name…", "a", self.ask_export)
             replace_it = ("Replace it", "r", lambda: self._export(path, overwrites=True))
-            text = f"{path} already exists."
+            verb = "exists" if len(existing_files) == 1 else "exist"
+            text = f"{' and '.join(existing_files)} already {verb}."
             self.editor.ask_question("Replace the file?", text, another_name, replace_it, _CANCEL)
             return None
         report = export_map(self.editor.sketch.build_environment(), path)
