@@ -76,9 +76,24 @@ def test_a_large_omitted_part_is_noted() -> None:
     # A speck next to it, such as the inside of a letter, is not offered.
     _, report = build_environment(build_foreign_map(CLOSET, ROOM, box(30, 0, 30.2, 0.2)), Shaping(), "plan")
     assert len(report.others) == 1
-    assert "stays" not in join_lines(
-        build_environment(build_foreign_map(CLOSET, ROOM), Shaping(keep="all"), "plan")[1]
-    )
+    _, report = build_environment(build_foreign_map(CLOSET, ROOM), Shaping(keep="all"), "plan")
+    assert "is kept" not in join_lines(report)
+
+
+def test_parts_that_are_too_small_are_not_offered_if_all_parts_are_requested() -> None:
+    shaping = Shaping(keep="all", specks=10.0)
+    _, report = build_environment(build_foreign_map(CLOSET, box(20, 10, 24, 13)), shaping, "plan")
+    assert report.dropped == ("1 separate part of the free space, 9 m²",)
+    assert "--keep all" not in join_lines(report)
+    assert report.others == ()
+
+
+def test_positions_offered_in_narrow_parts_are_free() -> None:
+    slit = box(20.0012, 0, 20.0048, 6000)
+    whole = build_foreign_map(ROOM, slit)
+    expected = r"20\.003 \S+ is one in the nearest part, 5 m away"
+    with pytest.raises(MapError, match=expected):
+        build_environment(whole, Shaping(inside=(25.0048, 1.0)), "plan")
 
 
 @pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])

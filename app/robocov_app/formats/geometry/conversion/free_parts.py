@@ -25,6 +25,8 @@ _LARGE_PART_SHARE = 0.1
 _MAX_OFFERED_PARTS = 3
 _MIN_OFFERED_SHARE = 0.01
 """The report offers no part below this fraction of the largest dropped one, such as the inside of letters."""
+_MAX_POSITION_DIGITS = 9
+"""Positions that would need at least this many decimals are not rounded."""
 _MIN_PAGE_EDGE_SHARE = 0.2
 """The largest part may be the paper around a plan if it borders on this fraction of the edge of the page."""
 _MIN_PLAN_SHARE = 0.05
@@ -219,7 +221,9 @@ def _report_dropped_parts(
     conversion.dropped.append(f"{count} of the free space, {_format_total_area(dropped)}{largest}")
     area = shapely.area(parts)
     share = area[is_kept].sum() / area.sum()
-    if share >= _MIN_KEPT_SHARE and dropped[0].area / area.sum() <= _LARGE_PART_SHARE:
+    is_minor = share >= _MIN_KEPT_SHARE and dropped[0].area / area.sum() <= _LARGE_PART_SHARE
+    # If all parts are requested, those that are dropped are too small to be offered.
+    if is_minor or conversion.shaping.keep == "all":
         return ()
     min_area = _MIN_OFFERED_SHARE * dropped[0].area
     offered = [part for part in dropped[:_MAX_OFFERED_PARTS] if part.area >= min_area]
@@ -262,9 +266,15 @@ def _measure_length_along(part: Polygon, page: Polygon) -> float:
 
 
 def _choose_position_in(part: Polygon) -> tuple[float, float]:
-    """Return a position in a part, rounded to the centimeter."""
+    """Return a position in a part, rounded to the centimeter or, in a narrow part, as little as needed."""
     point = shapely.point_on_surface(part)
-    return round(point.x, 2) + 0.0, round(point.y, 2) + 0.0
+    for digits in range(2, _MAX_POSITION_DIGITS):
+        # Adding 0 turns -0 into 0.
+        x = round(point.x, digits) + 0.0
+        y = round(point.y, digits) + 0.0
+        if shapely.contains_xy(part, x, y):
+            return x, y
+    return point.x, point.y
 
 
 def _format_total_area(parts: list[Polygon]) -> str:
