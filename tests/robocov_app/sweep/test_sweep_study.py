@@ -10,7 +10,7 @@ import pytest
 from small_studies import HALL, ROOM, build_small_study, write_controller
 
 from robocov.errors import InputError, ParameterError
-from robocov_app.sweep.study.parameters import build_swept_team
+from robocov_app.sweep.study.parameters import build_swept_team, format_parameter
 from robocov_app.sweep.study.sampling import Range, Sampling
 from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.tasks import generate_tasks
@@ -155,6 +155,13 @@ def test_a_study_cannot_be_changed() -> None:
 
 
 GROUPS = ({"count": 1, "max_speed": 1.0, "radius": 0.15}, {"count": 2, "max_speed": 0.4})
+
+
+def test_groups_are_listed_without_blanks_before_commas() -> None:
+    groups = json.dumps([{"count": 2, "kinematics": "unicycle", "max_speed": 0.5}, {"count": 1}])
+    assert (
+        format_parameter("groups", groups) == "2 with kinematics unicycle, max speed 0.5 m/s; 1 as the rest"
+    )
 
 
 def test_a_team_of_groups() -> None:

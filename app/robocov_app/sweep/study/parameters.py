@@ -107,7 +107,7 @@ def _format_group(group: Mapping[str, Any]) -> str:
     for name, value in group.items():
         if name != "count":
             text = value if isinstance(value, str) else f"{value:g}"
-            differences.append(f"{name.replace('_', ' ')} {text} {UNITS[name]}")
+            differences.append(f"{name.replace('_', ' ')} {text} {UNITS[name]}".rstrip())
     if not differences:
         return f"{group['count']} as the rest"
     return f"{group['count']} with {', '.join(differences)}"
