@@ -346,6 +346,11 @@ def export_map(
         Name of the format. By default the suffix of the file decides.
     options : WriteOptions
 
+    Returns
+    -------
+    ExportReport
+        The files, and what the format cannot represent.
+
     Raises
     ------
     ParameterError
