@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import shutil
 import subprocess
 import tempfile
@@ -14,7 +15,7 @@ from typing import IO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.errors import OutputError, ParameterError, describe_error, quote
+from robocov.errors import OutputError, ParameterError, describe_error, quote, to_one_line
 from robocov.files.writing import replace_file
 
 Frame: TypeAlias = NDArray[np.uint8]
@@ -23,6 +24,8 @@ _PNG_COMPRESSION_LEVEL = 2
 """A low level is several times as fast, and files of drawings with flat colors are small anyway."""
 _SECONDS_PER_KEYFRAME = 2
 """Time between two keyframes of a streamed video."""
+_ENCODER_VARIABLE = "IMAGEIO_FFMPEG_EXE"
+"""Environment variable with the path of ffmpeg, which imageio-ffmpeg uses, too."""
 
 
 def encode_png(frame: Frame) -> bytes:
@@ -167,7 +170,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
 
 
 def find_encoder() -> str:
-    """Find the program ffmpeg, first that of the extra "video", then that on the PATH.
+    """Find the program ffmpeg: that of IMAGEIO_FFMPEG_EXE, of the extra "video", or on the PATH.
 
     Returns
     -------
@@ -177,8 +180,15 @@ def find_encoder() -> str:
     Raises
     ------
     OutputError
-        If ffmpeg is not found.
+        If ffmpeg is not found, or IMAGEIO_FFMPEG_EXE is not the path of a program.
     """
+    configured_path = os.environ.get(_ENCODER_VARIABLE)
+    if configured_path:
+        program = shutil.which(configured_path)
+        if program is None:
+            actual = to_one_line(configured_path)
+            raise OutputError(f"{_ENCODER_VARIABLE}: expected the path of ffmpeg, got {actual}")
+        return program
     with contextlib.suppress(ModuleNotFoundError, RuntimeError):
         from imageio_ffmpeg import get_ffmpeg_exe
 
@@ -186,7 +196,8 @@ def find_encoder() -> str:
     program = shutil.which("ffmpeg")
     if program is None:
         raise OutputError(
-            'video: ffmpeg was not found; pip install "robocov[video]", or set IMAGEIO_FFMPEG_EXE to its path'
+            'video: ffmpeg was not found; pip install "robocov[video]", '
+            f"or set {_ENCODER_VARIABLE} to its path"
         )
     return program
 

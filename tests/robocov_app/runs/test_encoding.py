@@ -341,6 +341,19 @@ class TestEncoder:
             save_video(tmp_path / "run.mp4", generate_frames(2))
         assert list_names(tmp_path) == []
 
+    def test_a_wrong_path_of_the_encoder_is_reported_before_a_run(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "nothing"))
+        with pytest.raises(OutputError, match=r"IMAGEIO_FFMPEG_EXE: expected .* ffmpeg, got .*nothing$"):
+            VideoOptions(video=True)
+
+    @pytest.mark.usefixtures("missing_encoder")
+    def test_the_path_of_the_encoder_needs_no_further_package(self, tmp_path, monkeypatch):
+        encoder = tmp_path / "my-encoder"
+        encoder.write_text("")
+        encoder.chmod(0o755)
+        monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(encoder))
+        assert find_encoder() == str(encoder)
+
     @pytest.mark.usefixtures("missing_encoder")
     def test_a_missing_encoder_is_reported_before_a_run(self):
         with pytest.raises(OutputError, match="ffmpeg was not found"):
