@@ -143,6 +143,12 @@ def test_a_report_compares_the_choices(swept_folder: Path) -> None:
     assert "median:" in plots[0].svg
 
 
+def test_axes_of_parameters_without_a_unit_have_no_parentheses() -> None:
+    runs = [build_run(team=(("loss", loss),)) for loss in (0.0, 0.2)]
+    (plot,) = build_parameter_plots(build_result(runs), "k")
+    assert "against loss. " in plot.svg
+
+
 def test_choices_are_formatted_without_a_unit() -> None:
     gains = [("target", "median"), ("height", 0.5)]
     assert format_gains(gains, {"height": "m"}) == "target median, height 0.5 m"

@@ -140,14 +140,10 @@ def _choose_axis(
 
 def _describe_gain(result: ReportedResult, name: str) -> _Parameter:
     """Return a gain as a parameter."""
-    title = name
-    unit = result.gain_units.get(name, "")
-    if unit:
-        title += f" ({unit})"
     values = dict.fromkeys(dict(run.gains).get(name) for run in result.completed_runs)
     return _Parameter(
         name=name,
-        title=title,
+        title=_add_unit(name, result.gain_units.get(name, "")),
         get_value=lambda run: dict(run.gains)[name],
         choices=tuple(value for value in values if isinstance(value, str)),
     )
@@ -164,8 +160,15 @@ def _list_team_parameters(result: ReportedResult) -> list[_Parameter]:
 
 def _describe_team_parameter(name: str) -> _Parameter:
     """Return a parameter of the team."""
-    title = f"{name.replace('_', ' ')} ({UNITS[name]})"
+    title = _add_unit(name.replace("_", " "), UNITS[name])
     return _Parameter(name, title, lambda run: dict(run.team)[name])
+
+
+def _add_unit(title: str, unit: str) -> str:
+    """Return a title with a unit in parentheses, if there is one."""
+    if unit:
+        return f"{title} ({unit})"
+    return title
 
 
 def _build_plot(
