@@ -174,7 +174,7 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_p
     assert len(load_map(path).obstacles) == 1
     driver.post(pygame.DROPFILE, file=str(path))
     driver.settle()
-    assert driver.message == "Read again: untitled.json"
+    assert driver.message == "Reloaded: untitled.json"
     path.unlink()
     driver.window.run_frame(2.0)
     driver.window.run_frame(2.0)

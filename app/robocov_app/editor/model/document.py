@@ -246,7 +246,7 @@ class Document:
         """Read the file again, as a change that can be undone."""
         assert self.path is not None
         sketch, self.version = read_sketch(self.path)
-        self.history.apply(Change(sketch, Selection(), "read again from the file"))
+        self.history.apply(Change(sketch, Selection(), "reloaded from the file"))
         self._mark_as_saved()
 
     def ignore_disk_change(self) -> None:

@@ -338,7 +338,7 @@ class FileCommands:
         require(self.editor.document.path, "the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
-        return f"read again: {self.editor.document.title}"
+        return f"reloaded: {self.editor.document.title}"
 
     def open_background(self, path: Path) -> None:
         """Set the background image, and choose the tool that scales and moves it."""
