@@ -265,7 +265,7 @@ def is_own_module(name: str) -> bool:
     """
     importlib.invalidate_caches()
     spec = PathFinder.find_spec(name)
-    return spec is not None and _is_own(spec)
+    return spec is not None and _is_own(name, spec)
 
 
 class _ModuleCollector:
@@ -298,7 +298,7 @@ class _ModuleCollector:
         # parent package, which has not been imported.
         lookup_name = name if locations is None else name.rpartition(".")[2]
         spec = PathFinder.find_spec(lookup_name, locations)
-        if spec is None or not _is_own(spec):
+        if spec is None or not _is_own(name, spec):
             return []
         self._locations[name] = list(spec.submodule_search_locations or ())
         if spec.origin is None:
@@ -329,10 +329,10 @@ def _list_imports(text: str, package: str) -> Iterator[str]:
             yield from (f"{base}.{alias.name}" for alias in node.names if base)
 
 
-def _is_own(spec: ModuleSpec) -> bool:
-    """Return whether a module is neither installed nor a part of Python or robocov."""
+def _is_own(name: str, spec: ModuleSpec) -> bool:
+    """Return whether the module with a full name is neither installed nor a part of Python or robocov."""
     is_built_in = spec.origin is not None and not spec.has_location
-    if is_built_in or spec.name.partition(".")[0] in ("robocov", "robocov_app"):
+    if is_built_in or name.partition(".")[0] in ("robocov", "robocov_app"):
         return False
     folders = spec.submodule_search_locations or ()
     path = Path(os.path.realpath(spec.origin or next(iter(folders), "")))
