@@ -19,7 +19,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
+from robocov.errors import (
+    ControllerEndedError,
+    ParameterError,
+    RobocovError,
+    describe_unknown_name,
+    quote,
+    to_one_line,
+)
 from robocov.files.paths import is_existing_file
 
 MODULE_PREFIX = "robocov_user_"
@@ -88,10 +95,10 @@ def explain_fault(context: str, error: BaseException, ending: str = "") -> Roboc
 
 
 def _describe_exception(error: BaseException) -> str:
-    """Return the class and the message of an exception."""
+    """Return the class and the message of an exception, on one line."""
     name = type(error).__name__
     try:
-        message = str(error)
+        message = to_one_line(error)
     except Exception:  # The class of the exception may be the user's own, and fail to build a message.
         return f"{name} (no message)"
     return f"{name}: {message}" if message else name

@@ -107,6 +107,12 @@ def test_errors_in_a_file_are_explained(controller_file: Path) -> None:
         make_controller(f"{controller_file}:Mine")
 
 
+def test_an_error_with_several_lines_is_explained_on_one_line(controller_file: Path) -> None:
+    controller_file.write_text("raise ValueError('one\\ntwo\\x1b[31m')\n")
+    with pytest.raises(ParameterError, match=r"ValueError: one\\ntwo\\x1b\[31m \(mine.py, line 1\)$"):
+        make_controller(f"{controller_file}:Mine")
+
+
 def test_an_error_in_a_generated_method_is_located_at_the_line_that_calls_it(controller_file: Path) -> None:
     text = controller_file.read_text()
     controller_file.write_text(
