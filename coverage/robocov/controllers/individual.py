@@ -20,6 +20,9 @@ from robocov.typing import FloatArray
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh
 
+_CONTROLLER_MEMBERS = ("name", "label", "summary", "begin", "decide")
+"""Members that a controller of a team must have."""
+
 
 @dataclass(eq=False)
 class OwnView:
@@ -346,7 +349,14 @@ def require_controller(value: Any) -> Controller:
         If the value is not a controller, or one of its gains is not allowed.
     """
     team_controller = to_team_controller(value)
-    if isinstance(team_controller, type) or not isinstance(team_controller, Controller):
+    is_object = not isinstance(team_controller, type)
+    missing = [member for member in _CONTROLLER_MEMBERS if not hasattr(team_controller, member)]
+    if is_object and missing and hasattr(team_controller, "decide"):
+        raise ParameterError(
+            f"controller: expected an object with {', '.join(_CONTROLLER_MEMBERS)}, "
+            f"got {quote(team_controller)} without {', '.join(missing)}"
+        )
+    if missing or not is_object:
         raise ParameterError(
             "controller: expected a controller, as in Rapf(), with a method decide or force, "
             f"got {quote(team_controller)}"

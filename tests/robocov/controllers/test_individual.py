@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -148,6 +149,22 @@ def test_only_individual_controllers_are_adapted() -> None:
     assert to_team_controller(rapf) is rapf
     assert unwrap_controller(rapf) is rapf
     assert to_team_controller(Returning) is Returning
+
+
+def test_missing_members_of_a_controller_of_a_team_are_named() -> None:
+    class Resting:
+        name = label = "resting"
+
+        def decide(self, seen: Observations, memory: Any) -> None: ...
+
+        def __repr__(self) -> str:
+            return "Resting()"
+
+    expected = "with name, label, summary, begin, decide, got Resting() without summary, begin"
+    with pytest.raises(ParameterError, match=re.escape(expected)):
+        require_controller(Resting())
+    with pytest.raises(ParameterError, match=r"as in Rapf\(\), with a method decide or force, got <class"):
+        require_controller(Rapf)
 
 
 @pytest.mark.parametrize("shy", [-3.0, "a", np.nan])
