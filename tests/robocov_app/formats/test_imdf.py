@@ -158,6 +158,41 @@ def test_a_missing_level_is_reported(tmp_path: Path) -> None:
         read(write_folder(tmp_path / "house", venue), level="DG")
 
 
+def test_a_number_selects_the_floor_with_this_number_even_if_another_has_it_as_a_name(tmp_path: Path) -> None:
+    venue = build_venue()
+    for level, name in zip(venue["level"], ("1", "2"), strict=True):
+        level["properties"]["short_name"] = {"en": name}
+    folder = write_folder(tmp_path / "mill", venue)
+    assert read(folder, level="1").free.area == pytest.approx(600, rel=1e-4)
+    assert "level 1 ('2') of 0, 1 (--level)" in read(folder, level="1").notes
+    assert "level 1 ('2') of 0, 1 (--level)" in read(folder, level="2").notes
+
+
+def test_of_two_levels_with_the_same_name_the_one_with_units_is_read(tmp_path: Path) -> None:
+    venue = build_venue()
+    attic = build_feature("level", build_area(0, 0, 30, 20), ordinal=2, short_name={"de": "OG"})
+    venue["level"].insert(0, {**attic, "id": "attic"})
+    foreign = read(write_folder(tmp_path / "mill", venue), level="OG")
+    assert foreign.free.area == pytest.approx(600, rel=1e-4)
+
+
+def test_only_stairs_that_become_obstacles_are_counted_as_solid(tmp_path: Path) -> None:
+    venue = build_venue()
+    venue["unit"].append(build_feature("unit", None, category="elevator", level_id=GROUND))
+    folder = write_folder(tmp_path / "mill", venue)
+    note = "stairs, elevators and openings to the floor below treated as solid"
+    assert f"{note}: 1" in read(folder).notes
+    assert not any(note in other for other in read(folder, skip=("stairs",)).notes)
+
+
+def test_an_opening_that_is_not_a_line_is_left_out(tmp_path: Path) -> None:
+    venue = build_venue()
+    venue["opening"].append(build_feature("opening", build_area(14, 11.9, 15, 12.1), level_id=GROUND))
+    foreign = read(write_folder(tmp_path / "mill", venue))
+    assert "1 opening that is not a line" in foreign.dropped
+    assert move_to_corner(foreign.free).contains(Point(14.5, 11.94)), "it is not an obstacle"
+
+
 def test_units_without_openings_are_open_to_each_other(tmp_path: Path) -> None:
     files = build_venue()
     del files["opening"]

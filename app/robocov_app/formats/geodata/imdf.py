@@ -127,18 +127,22 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         for k, feature in enumerate(archive.list_features(name)):
             if _get_level_id(feature) not in level_ids:
                 continue
-            if name == "unit" and _get_category(feature) in _NO_FLOOR:
-                undrivable_count += 1
+            is_solid = False
             for geometry in _collect_geometries(archive.files[name], k, feature, shapes):
                 role = _choose_role(name, feature, geometry)
                 if role is None:
-                    shapes.count_omission(name, "without an area")
+                    reason = "that is not a line" if name == "opening" else "without an area"
+                    shapes.count_omission(name, reason)
                     continue
                 roles.append(role)
+                if role == "solid" and shapes.labels.accepts(geometry.labels):
+                    is_solid = True
                 if role == "opening":
                     # `build_floor` requires openings that are straight lines of two points.
                     geometry = _straighten(geometry)
                 geometries.append(geometry)
+            if name == "unit" and is_solid and _get_category(feature) in _NO_FLOOR:
+                undrivable_count += 1
     if undrivable_count:
         note = "stairs, elevators and openings to the floor below treated as solid"
         shapes.notes.append(f"{note}: {undrivable_count}")
@@ -158,11 +162,12 @@ def _choose_role(name: str, feature: dict[str, Any], geometry: SourceGeometry) -
     feature : dict
     geometry : SourceGeometry
     """
+    if name == "opening":
+        return "opening" if geometry.kind == "line" else None
     if geometry.kind == "point":
         return None
     if geometry.kind == "line":
-        roles: dict[str, Role | None] = {"unit": None, "opening": "opening"}
-        return roles.get(name, "wall")
+        return None if name == "unit" else "wall"
     if name != "unit":
         return "solid"
     category = _get_category(feature)
@@ -250,23 +255,23 @@ def _choose_floor(
 ) -> float:
     """Return the ordinal of the floor to be read.
 
-    `requested` is its name or number; with None, it is the floor nearest to the ground floor. If the venue
-    has several floors, a note lists them.
+    `requested` is its number or name; a name that is also the number of a floor counts as the number. With
+    None, it is the floor nearest to the ground floor. If the venue has several floors, a note lists them.
     """
     used_ids = {_get_level_id(feature) for feature in archive.list_features("unit")}
     # Only floors with units. `choose_floor` does not use their areas, here 1.
     floors = {level.ordinal: 1.0 for level_id, level in levels.items() if level_id in used_ids}
     if not floors:
         raise MapError(f"{archive.source_name}: expected units on its levels, got none")
+    used_levels = [level for level in levels.values() if level.ordinal in floors]
     number = requested
-    if requested is not None:
-        with_name = [level for level in levels.values() if _has_name(level, requested)]
+    if requested is not None and files.parse_number(requested) not in floors:
+        with_name = [level for level in used_levels if _has_name(level, requested)]
         if with_name:
             number = f"{with_name[0].ordinal:g}"
     try:
         floor = choose_floor(floors, number, archive.source_name)
     except ParameterError:
-        used_levels = [level for level in levels.values() if level.ordinal in floors]
         names = sorted({name for level in used_levels for name in level.names[1:2]})
         known = f"one of {list_floors(floors)}"
         if names:
