@@ -140,6 +140,17 @@ obstacle:
     assert environment.starts["robots"].positions == ((0.0, 3.0), (1.0, 3.0))  # type: ignore[union-attr]
 
 
+def test_obstacles_that_are_left_out_are_not_counted_as_fixed(tmp_path: Path) -> None:
+    text = """
+obstacle:
+  - {shape: {name: circle, random_shape: true}, kinematics: {name: omni}, state: [5, 5]}
+  - {number: 0, distribution: {name: random}}
+"""
+    foreign = read(tmp_path, text)
+    assert foreign.notes == ()
+    assert foreign.dropped == ("1 shape of random form",)
+
+
 def test_a_picture_fills_the_world_for_any_cell_size(tmp_path: Path) -> None:
     (tmp_path / "grid.pgm").write_bytes(build_pgm(draw_pixels("#...\n....\n...#")))
     foreign = read(tmp_path, "  obstacle_map: 'grid.pgm'\n")

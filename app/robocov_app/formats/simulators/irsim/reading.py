@@ -125,7 +125,8 @@ class _GroupReader:
             group["number"].raise_error(f"a number of at most {MAX_OBJECTS} in total")
         states = self._parse_states(group, number)
         if states is None:
-            self._shapes.count_omission(kind, "that IR-SIM places at random", number)
+            if number > 0:
+                self._shapes.count_omission(kind, "that IR-SIM places at random", number)
             return
         names = group["name"].list_items(allow_single=True)
         for k in range(number):
@@ -149,11 +150,13 @@ class _GroupReader:
         if group["unobstructed"].is_true():
             self._shapes.count_omission("obstacle", "that nothing collides with")
             return
-        if group["kinematics"].is_given:
-            self._moving_count += 1
         # Without a shape, the node that is not given stands for a shape with default values.
         candidates = group["shape"].list_items(allow_single=True) or [group["shape"]]
-        self._shape_reader.add(_get_item(candidates, k), frame, labels)
+        shape = _get_item(candidates, k)
+        # Obstacles of random shape are left out.
+        if group["kinematics"].is_given and not shape["random_shape"].is_true():
+            self._moving_count += 1
+        self._shape_reader.add(shape, frame, labels)
 
     def _parse_states(self, group: Node, number: int) -> list[FloatArray] | None:
         """Return the states [x, y, theta] of a group, or None if they are random.
