@@ -478,7 +478,7 @@ def to_floats(
     name : str
         Name of the parameter in the message.
     values : array_like
-        The numbers to convert.
+        The real numbers to convert.
     expected : str
         Description of the numbers in the message.
     error_type : type
@@ -505,7 +505,11 @@ def to_floats(
     import numpy as np
 
     try:
-        return np.array(values, dtype=np.float64)
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            # Without this check, NumPy would discard the imaginary parts, and only warn.
+            raise TypeError("expected real numbers, got complex ones")
+        return np.array(array, dtype=np.float64)
     except Exception:
         # The values may be of any class, such as a tensor of another library, and their conversion may fail
         # with any error.

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint
 from itertools import count
 
+import numpy as np
 import pytest
 
 import robocov as rc
 from robocov import errors
 from robocov.controllers import list_controller_classes
-from robocov.errors import InputError, Issue, MapError, format_path
+from robocov.errors import InputError, Issue, MapError, ParameterError, format_path, to_floats
 
 
 def test_errors_of_input_and_output_are_errors_of_robocov() -> None:
@@ -170,6 +171,12 @@ def test_issues_in_python_name_the_argument_and_what_was_expected(
     with pytest.raises(InputError) as caught:
         call()
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize("values", [[[1j, 2]], np.array([[1j, 2]]), [np.array([1j, 2])]])
+def test_complex_numbers_are_not_converted_to_real_ones(values: object) -> None:
+    with pytest.raises(ParameterError, match=r"starts: expected \[x, y\] of each robot, got"):
+        to_floats("starts", values, "[x, y] of each robot")
 
 
 def test_a_package_whose_controller_cannot_be_loaded_causes_a_warning(
