@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,7 +26,16 @@ from robocov.environment.polygons import (
     unite_shapes,
 )
 from robocov.environment.starts import Start, StartSpec, UniformStart
-from robocov.errors import StartError, describe_unknown_name, format_count, require_number, require_type
+from robocov.errors import (
+    ParameterError,
+    StartError,
+    describe_unknown_name,
+    format_count,
+    is_number,
+    quote,
+    require_number,
+    require_type,
+)
 from robocov.observation.region import Region
 from robocov.typing import FloatArray, Ring
 
@@ -177,7 +187,14 @@ class Environment(Drawable):
         Environment
             The map with its obstacles at their positions at this time. It is the same object if no obstacle
             moves.
+
+        Raises
+        ------
+        ParameterError
+            If the time is not a finite number.
         """
+        if not is_number(time) or not math.isfinite(time):
+            raise ParameterError(f"time: expected a finite number, got {quote(time)}")
         if not self.has_moving_obstacles:
             return self
         obstacles = []

@@ -18,7 +18,7 @@ from robocov.environment import (
     Repeat,
     WallObstacle,
 )
-from robocov.errors import MapError
+from robocov.errors import MapError, ParameterError
 from robocov.mapfile import build_map_schema, dump_map, from_json, parse_map, to_json
 
 HALL = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
@@ -100,6 +100,14 @@ def test_the_map_at_a_time_has_obstacles_at_their_current_positions() -> None:
         assert environment.at(time).free_area == pytest.approx(environment.free_area, abs=1e-4)
     assert environment.at(3.0).free.wkb == environment.at(3.0 + 24.0).free.wkb
     assert environment.static.obstacles == environment.obstacles[:1]
+
+
+@pytest.mark.parametrize("time", [math.inf, math.nan, "soon"])
+def test_there_is_no_map_at_a_time_that_is_not_a_finite_number(time: object) -> None:
+    disc = CircleObstacle((3.0, 2.0), 0.5, path=ObstaclePath(((0, 0), (4, 0)), 1.0))
+    hall = Environment("hall", HALL, obstacles=(disc,))
+    with pytest.raises(ParameterError, match="time: expected a finite number, got"):
+        hall.at(time)  # type: ignore[arg-type]
 
 
 def test_periodic_obstacles_return_exactly_including_holes() -> None:
