@@ -88,6 +88,8 @@ class Drawable:
         ------
         ParameterError
             If the axes or an option cannot be used, or there is no such backend.
+        RobocovError
+            If no backend is installed, or it cannot be loaded.
         """
         plot = getattr(load_drawing_backend(backend), f"plot_{self._drawing_name}")
         return plot(self, axes, **options)

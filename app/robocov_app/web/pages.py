@@ -36,7 +36,7 @@ MAX_SHRINKAGE = 1.6
 MAX_NOTICES = 8
 """Maximum number of notices waiting to be sent to a page."""
 MAX_FRAMES_IN_FLIGHT = 2
-"""Maximum number of frames that were sent to a page but that it has not shown yet."""
+"""Maximum number of frames that were sent to a page but not shown yet."""
 
 
 class MapSize(NamedTuple):

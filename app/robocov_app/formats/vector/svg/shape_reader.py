@@ -53,7 +53,7 @@ class ShapeReader:
         Length of a unit of the root.
     key : ColorKey
         Colors with a declared role.
-    dashed : int
+    dashed_count : int
         Number of dashed strokes.
     """
 
