@@ -89,8 +89,8 @@ class ConfigurationSpace:
         """
         areas = np.array(self.components, dtype=object)[robot_components]
         positions = find_nearest_inside(areas, positions)
+        max_distance = self.spacing * (1.0 - _RELATIVE_ROUNDING)
         for _ in range(_MAX_PUSHES):
-            max_distance = self.spacing * (1.0 - _RELATIVE_ROUNDING)
             pairs = cKDTree(positions).query_pairs(max_distance, output_type="ndarray")
             if len(pairs) == 0:
                 return positions
