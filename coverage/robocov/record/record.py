@@ -383,7 +383,8 @@ class Record(Drawable):
             "seed": self.seed,
             "dt_s": self.dt,
             "duration_s": float(self.time[-1]),
-            "lattice": lattice,
+            # The JSON encoder rejects NumPy integers.
+            "lattice": None if lattice is None else int(lattice),
         }
         if self.conditions is not None:
             document["conditions"] = self.conditions.to_dict()
@@ -411,6 +412,8 @@ class Record(Drawable):
         ------
         OutputError
             If the folder or a file cannot be written.
+        InputError
+            If the replacement of an earlier result in the folder was interrupted, and cannot be completed.
         ValueError
             If the summary contains a number that JSON cannot represent. Nothing is written then.
         """

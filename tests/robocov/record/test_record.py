@@ -61,6 +61,11 @@ def test_a_summary_that_json_cannot_contain_leaves_the_saved_run_unchanged(
     assert not (tmp_path / "new").exists()
 
 
+def test_the_number_of_lattice_sites_may_be_an_integer_of_numpy(record: Record, tmp_path: Path) -> None:
+    record.save(tmp_path, lattice=np.int64(64))
+    assert json.loads((tmp_path / "run.json").read_text())["lattice"] == 64
+
+
 def test_gains_with_a_former_spelling_are_loaded_with_the_present_one(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())
