@@ -349,14 +349,14 @@ def require_controller(value: Any) -> Controller:
         If the value is not a controller, or one of its gains is not allowed.
     """
     team_controller = to_team_controller(value)
-    is_object = not isinstance(team_controller, type)
+    is_class = isinstance(team_controller, type)
     missing = [member for member in _CONTROLLER_MEMBERS if not hasattr(team_controller, member)]
-    if is_object and missing and hasattr(team_controller, "decide"):
+    if missing and not is_class and hasattr(team_controller, "decide"):
         raise ParameterError(
             f"controller: expected an object with {', '.join(_CONTROLLER_MEMBERS)}, "
             f"got {quote(team_controller)} without {', '.join(missing)}"
         )
-    if missing or not is_object:
+    if is_class or not isinstance(team_controller, Controller):
         raise ParameterError(
             "controller: expected a controller, as in Rapf(), with a method decide or force, "
             f"got {quote(team_controller)}"
