@@ -205,6 +205,31 @@ class Environment(Drawable):
             obstacles.append(obstacle)
         return replace(self, obstacles=tuple(obstacles))
 
+    def advance(self, time: float) -> Environment:
+        """Return the map for a run that continues another run from a time.
+
+        Parameters
+        ----------
+        time : float, s
+            Time since the beginning of the other run.
+
+        Returns
+        -------
+        Environment
+            The map whose obstacles are at time zero where those of this map are at the given time, and then
+            move in the same way. It is the same object if no obstacle moves.
+        """
+        if time == 0.0 or not self.has_moving_obstacles:
+            return self
+        obstacles = []
+        for obstacle in self.obstacles:
+            path = obstacle.path
+            if path is not None:
+                shifted = shift_obstacle(obstacle, path.compute_displacement(time))
+                obstacle = replace(shifted, path=path.advance(time))
+            obstacles.append(obstacle)
+        return replace(self, obstacles=tuple(obstacles))
+
     @property
     def area(self) -> float:
         """Area inside the boundary, m²."""

@@ -100,6 +100,36 @@ class ObstaclePath:
         y = np.interp(path_length, path_lengths, points[:, 1])
         return np.asarray(np.array([x, y]) - points[0])
 
+    def advance(self, time: float) -> ObstaclePath:
+        """Return the path from the point that it has reached at a time.
+
+        Parameters
+        ----------
+        time : float, s
+            Time since the beginning of a run.
+
+        Returns
+        -------
+        ObstaclePath
+            A loop along which an obstacle at its position at this time continues in the same way.
+
+        Examples
+        --------
+        >>> import robocov as rc
+        >>> path = rc.ObstaclePath(((0.0, 0.0), (4.0, 0.0)), speed=2.0)
+        >>> path.advance(1.0)
+        ObstaclePath(points=((2.0, 0.0), (4.0, 0.0), (0.0, 0.0)), speed=2.0, repeat='loop')
+        """
+        points, path_lengths = self._round_trip
+        path_length = (time * self.speed) % path_lengths[-1]
+        current_point = points[0] + self.compute_displacement(time)
+        # The last point of a round trip is the first one again.
+        vertices = points[:-1]
+        is_ahead = path_lengths[:-1] > path_length
+        is_behind = path_lengths[:-1] < path_length
+        loop = np.concatenate([[current_point], vertices[is_ahead], vertices[is_behind]])
+        return ObstaclePath(to_tuples(loop.tolist()), self.speed, "loop")
+
 
 def compute_swept_area(shape: BaseGeometry, path: ObstaclePath) -> BaseGeometry:
     """Compute the area that an obstacle sweeps on its path.

@@ -122,10 +122,44 @@ def test_periodic_obstacles_return_exactly_including_holes() -> None:
     assert shape.holes == (tuple((x + dx, y + dy) for x, y in hole),)
 
 
+@given(lines, st.floats(0.01, 5), repeats, st.floats(0, 100), st.floats(0, 100))
+def test_an_advanced_path_continues_in_the_same_way(
+    line: list[tuple[float, float]], speed: float, repeat: Repeat, start_time: float, time: float
+) -> None:
+    path = ObstaclePath(line, speed, repeat)
+    advanced = path.advance(start_time)
+    displacement = path.compute_displacement(start_time) + advanced.compute_displacement(time)
+    np.testing.assert_allclose(displacement, path.compute_displacement(start_time + time), atol=1e-9)
+    assert advanced.period == pytest.approx(path.period)
+
+
+def test_a_path_that_is_advanced_to_a_vertex_starts_there() -> None:
+    square = ObstaclePath(((0, 0), (2, 0), (2, 1), (0, 1)), 0.5)
+    assert square.advance(4.0) == ObstaclePath(((2, 0), (2, 1), (0, 1), (0, 0)), 0.5)
+    assert square.advance(12.0) == square
+    line = ObstaclePath(((1, 1), (4, 5)), 1.0, "back-and-forth")
+    assert line.advance(5.0) == ObstaclePath(((4, 5), (1, 1)), 1.0)
+
+
+def test_an_advanced_map_continues_in_the_same_way() -> None:
+    environment = build_moving_hall()
+    advanced = environment.advance(3.7)
+    assert environment.advance(0.0) is environment
+    assert advanced.has_moving_obstacles
+    assert advanced.obstacles[0] == environment.obstacles[0]
+    for time in (0.0, 1.3, 20.0):
+        now = advanced.at(time).obstacles
+        expected = environment.at(3.7 + time).obstacles
+        assert [obstacle.name for obstacle in now] == [obstacle.name for obstacle in expected]
+        for obstacle, other in zip(now, expected, strict=True):
+            np.testing.assert_allclose(obstacle.polygon.bounds, other.polygon.bounds, atol=1e-8)
+
+
 def test_maps_without_moving_obstacles_do_not_depend_on_time() -> None:
     hall = Environment("hall", HALL, (CircleObstacle((2, 1), 0.5),))
     assert not hall.has_moving_obstacles
     assert hall.at(7.0) is hall
+    assert hall.advance(7.0) is hall
     assert hall.static is hall
 
 

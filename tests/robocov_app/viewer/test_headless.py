@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,11 @@ import pytest
 from sample_sessions import HALL, LLOYD, RAPF, advance_session, advance_with_costs, start_session
 from session_records import build_record, have_same_arrays, select_present_branch
 
-from robocov.environment import CircleObstacle
+from robocov.cost import CoverageCost, TimeVaryingCost
+from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import compute_path_lengths
+from robocov.metrics.results import read_history
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.settings import VideoSettings
@@ -219,6 +222,33 @@ def test_replay_shows_a_session_from_its_beginning(tmp_path: Path, monkeypatch: 
     assert session.timeline.is_at_record_end
     assert not session.playback.is_playing, "the playback stops at the end of the record"
     assert main(["replay", path, "--video", "--out", str(tmp_path / "film")]) == 2
+
+
+@pytest.mark.slow
+def test_moving_obstacles_of_a_later_part_start_where_they_are_then(tmp_path: Path) -> None:
+    # At the start of the second part, the pillar covers the start "corner".
+    path = ObstaclePath(((4.2, 1.2), (1.2, 1.2)), 8.0, "back-and-forth")
+    pillar = CircleObstacle((4.2, 1.2), 0.9, "pillar", path)
+    hall = replace(HALL, obstacles=(pillar, HALL.obstacles[1]))
+    session = advance_session(start_session(RAPF, environment=hall, start="far", robots=2), 22)
+    session.add_robot((5.0, 3.6))
+    advance_session(session, 30)
+    start_time = 22 / 60
+    file = save_session_file(session, tmp_path)
+    assert main(["run", file, *SMALL, "--out", str(tmp_path / "out")]) == 0
+    record = Record.load(tmp_path / "out" / "02-robot-3-joined")
+    environment = record.environment
+    assert set(environment.starts) == {"far", "spread"}
+    for time in (0.0, 0.2, 0.5):
+        moved = environment.at(time).obstacles[0].polygon
+        expected = hall.at(start_time + time).obstacles[0].polygon
+        np.testing.assert_allclose(moved.bounds, expected.bounds, atol=1e-8)
+    assert record.session["repeatable"] is False
+    history = read_history(tmp_path / "out" / "02-robot-3-joined" / "cost.csv")
+    cost = TimeVaryingCost(CoverageCost(hall, 16, radius=record.team.min_radius))
+    for index in (0, -1):
+        result = cost(start_time + history.time[index], record.positions[index])
+        assert history.mean_distance[index] == pytest.approx(result.mean_distance, abs=1e-4)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from robocov.controllers import has_memory
-from robocov.environment import CircleObstacle
+from robocov.environment import CircleObstacle, Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record, Recorder
 from robocov_app.render.density_text import format_cost, get_cost_name
@@ -15,7 +15,7 @@ from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import name_failed_robot
 from robocov_app.viewer.session.document import Node, SessionDocument, replay
 from robocov_app.viewer.session.editing.edits import PlaceRobot
-from robocov_app.viewer.session.editing.map_edits import add_obstacle
+from robocov_app.viewer.session.editing.map_edits import add_obstacle, replace_obstacles
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.states import PaneSetup
@@ -111,6 +111,9 @@ class BranchPart:
         First and last step.
     setups : dict of int to PaneSetup
         Setup of each pane, by its number.
+    environments : dict of int to Environment
+        Map of each pane, by its number, without failed robots. Moving obstacles are at time 0 where they are
+        at the start of the part.
     recorders : dict of int to Recorder
         Recorder of each pane, by its number.
     scenes : list of Scene
@@ -125,6 +128,7 @@ class BranchPart:
     node: Node
     first_step: int
     setups: dict[int, PaneSetup]
+    environments: dict[int, Environment]
     recorders: dict[int, Recorder]
     scenes: list[Scene]
     handled: list[HandledTime] = field(default_factory=list)
@@ -172,17 +176,31 @@ def split_branch(branch: SelectedBranch) -> list[BranchPart]:
             # restarts the run, that part stays, because it contains the start.
             if parts and parts[-1].node is node and node.scenario is None:
                 parts.pop()
-            recorders = {number: _build_recorder(setup, run.scenario.dt) for number, setup in setups.items()}
+            environments = {
+                number: _advance_map(setup.environment, run.time) for number, setup in setups.items()
+            }
+            recorders = {
+                number: _build_recorder(setup, environments[number], run.scenario.dt)
+                for number, setup in setups.items()
+            }
             scenes = [build_pane_scene(pane) for pane in panes]
-            parts.append(BranchPart(node, run.step, setups, recorders, scenes))
+            parts.append(BranchPart(node, run.step, setups, environments, recorders, scenes))
         parts[-1].add_step(run, node)
     parts[-1].scenes += [build_pane_scene(pane) for pane in panes]
     return parts
 
 
-def _build_recorder(setup: PaneSetup, dt: float) -> Recorder:
-    """Build the recorder of a pane. Its map contains failed robots as obstacles."""
-    environment = setup.environment
+def _advance_map(environment: Environment, start_time: float) -> Environment:
+    """Return the map for a part that starts at a time, s, so that the times of its records start at 0."""
+    advanced = environment.advance(start_time)
+    if advanced is environment:
+        return environment
+    # This removes starts that the obstacles cover at that time, with which the map could not be loaded.
+    return replace_obstacles(advanced, 0, len(advanced.obstacles), advanced.obstacles)
+
+
+def _build_recorder(setup: PaneSetup, environment: Environment, dt: float) -> Recorder:
+    """Build the recorder of a pane. To the map, failed robots are added as obstacles."""
     controller = setup.controller
     for number, position in setup.failed.items():
         name = name_failed_robot(number)
@@ -265,9 +283,12 @@ def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
 def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
     """Return whether a simulation from the start of the record, without user actions, reproduces it."""
     has_known_memory = part.first_step == 0 or not has_memory(setup.controller.build())
+    # Paths of obstacles that start later are shifted, which changes positions by rounding errors.
+    has_exact_paths = part.first_step == 0 or not setup.environment.has_moving_obstacles
     is_turned = record.steering is not None and bool(record.steering[0].any())
     has_all_robots = setup.numbers == setup.simulated_numbers
-    return has_known_memory and has_all_robots and not part.handled and not is_turned
+    is_exact = has_known_memory and has_exact_paths and has_all_robots
+    return is_exact and not part.handled and not is_turned
 
 
 def _describe_handled(period: HandledTime, first_step: int, dt: float) -> dict[str, Any]:

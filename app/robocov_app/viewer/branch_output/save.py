@@ -113,11 +113,11 @@ class _BranchWriter:
             start_comparison(target, names)
         runs: dict[str, Run] = {}
         costs: list[CoverageCost] = []
-        for setup, name, record in zip(part.setups.values(), names, records, strict=True):
+        for environment, name, record in zip(part.environments.values(), names, records, strict=True):
             run_folder = target / name if is_comparison else target
             record.save(run_folder)
             cost = build_cost(
-                setup.environment,
+                environment,
                 self.settings.lattice,
                 radius=record.team.min_radius,
                 quiet=True,
