@@ -14,8 +14,6 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from robocov.conditions import TIME_TOLERANCE_S, Conditions, Failure, Join
-from robocov.conditions.events import MAX_TIME_S
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import get_gain_values
 from robocov.controllers.individual import unwrap_controller
@@ -462,7 +460,7 @@ def _show_simulation(simulation: Simulation, height: int) -> LiveWindow:
     gains = get_gain_values(unwrap_controller(controller))
     conditions = simulation.conditions
     if conditions is not None:
-        conditions = _shift_conditions(conditions, simulation.time, len(simulation.team))
+        conditions = conditions.advance(simulation.time, len(simulation.team))
     session = Session(
         SessionScenario(
             simulation.environment,
@@ -493,25 +491,6 @@ def _require_showable(simulation: Simulation) -> None:
         raise ParameterError(f"simulation: {expected}, got {simulation.time:.2f} s")
     if not simulation.is_working.any():
         raise ParameterError("simulation: expected at least one working robot, got none")
-
-
-def _shift_conditions(conditions: Conditions, time: float, robot_count: int) -> Conditions:
-    """Return the conditions for a run that starts at a given time, s, of the original run.
-
-    Earlier failures happen at the start, and random failures at the times at which they would have happened.
-    """
-    _, failure_times = conditions.compute_working_periods(robot_count)
-    failures = [
-        Failure(robot, max(failure_time - time, 0.0))
-        for robot, failure_time in enumerate(failure_times.tolist(), start=1)
-        if failure_time - time <= MAX_TIME_S
-    ]
-    joins = [
-        Join(join.robot, join.time - time, join.position)
-        for join in conditions.joins
-        if join.time > time + TIME_TOLERANCE_S
-    ]
-    return replace(conditions, failure_rate=0.0, failures=tuple(failures), joins=tuple(joins))
 
 
 def _check_axes(axes: Any) -> None:

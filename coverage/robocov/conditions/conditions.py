@@ -201,6 +201,35 @@ class Conditions:
         remaining = replace(self, failure_rate=0.0, failures=(), joins=())
         return None if remaining.is_ideal else remaining
 
+    def advance(self, time: float, robot_count: int) -> Conditions:
+        """Return the conditions for a run that continues another run from a time.
+
+        Parameters
+        ----------
+        time : float, s
+            Time since the beginning of the other run.
+        robot_count : int
+            Number of robots of the team.
+
+        Returns
+        -------
+        Conditions
+            Earlier failures happen at the start, and random failures at the times at which they would have
+            happened. Robots that had joined are present from the start.
+        """
+        _, failure_times = self.compute_working_periods(robot_count)
+        failures = [
+            Failure(robot, max(failure_time - time, 0.0))
+            for robot, failure_time in enumerate(failure_times.tolist(), start=1)
+            if failure_time - time <= MAX_TIME_S
+        ]
+        joins = [
+            Join(join.robot, join.time - time, join.position)
+            for join in self.joins
+            if join.time > time + TIME_TOLERANCE_S
+        ]
+        return replace(self, failure_rate=0.0, failures=tuple(failures), joins=tuple(joins))
+
     def check_team(self, robot_count: int) -> None:
         """Check that the failures and joins are possible in a team.
 

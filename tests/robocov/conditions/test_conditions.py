@@ -257,3 +257,20 @@ def test_the_earlier_of_two_failures_counts() -> None:
     failures = ((1, 500.0), (2, 1e-6))
     _, stops = Conditions(failure_rate=1.0, seed=5, failures=failures).compute_working_periods(2)
     assert stops.tolist() == [random_stops[0], 1e-6]
+
+
+def test_conditions_that_are_advanced_have_the_same_events_earlier() -> None:
+    conditions = Conditions(
+        loss=0.1,
+        failure_rate=0.02,
+        failures=((1, 1.0), (2, 5.0)),
+        joins=((3, 1.0), (4, 4.0, (2.0, 1.0))),
+        seed=3,
+    )
+    advanced = conditions.advance(2.0, robot_count=5)
+    assert advanced.loss == conditions.loss
+    assert advanced.joins == ((4, 2.0, (2.0, 1.0)),)
+    times = np.linspace(0.0, 100.0, 501)
+    for find in ("find_working_robots", "find_present_robots"):
+        expected = getattr(conditions, find)(2.0 + times, 5)
+        np.testing.assert_array_equal(getattr(advanced, find)(times, 5), expected)

@@ -13,11 +13,13 @@ from session_records import COUNTING, build_record, build_records, have_same_arr
 
 from robocov import run
 from robocov.conditions import Conditions
+from robocov.controllers import Rapf
 from robocov.environment import ObstaclePath
 from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.scenario import Scenario
+from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.voronoi import WeightedCells
 from robocov_app.runs.saved_runs import SavedRun, build_roster
@@ -329,6 +331,28 @@ def test_records_that_start_later_are_rejected_if_obstacles_move(record: Record)
     expected = r"saved/0: expected a start at 0 s, because obstacles move, got 5 s; --frames"
     with pytest.raises(InputError, match=expected):
         replay(replace(moving_record, time=record.time + 5.0))
+
+
+def test_robots_fail_and_join_after_a_record_that_starts_later_as_in_its_run() -> None:
+    # The robots 1 and 5 fail and join before the record, 2 and 4 in it, and 3 and 6 after it.
+    conditions = Conditions(
+        failures=((1, 0.2), (2, 0.7), (3, 1.5)),
+        joins=((5, 0.3), (4, 0.8), (6, 1.6, (5.2, 3.2))),
+    )
+    starts = HALL.start("spread").sample(6, seed=0)
+    simulation = Simulation(HALL, Rapf(), starts, conditions=conditions)
+    simulation.run(0.5)
+    session = replay(simulation.run(0.5))
+    session.show_time(session.timeline.end_time)
+    pane = session.timeline.panes[0]
+    for expected, steps in [([3, 4, 5], 0), ([4, 5], 33), ([4, 5, 6], 27)]:
+        advance_session(session, steps)
+        for _ in range(steps):
+            simulation.step()
+        assert list(pane.numbers) == expected
+        np.testing.assert_array_equal(pane.positions, simulation.positions[simulation.is_working])
+    texts = [event.text for event in session.timeline.events]
+    assert texts[-2:] == ["robot 3 failed", "robot 6 joined"]
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,8 @@ def build_replay_session(saved: Sequence[SavedRun], controllers: Sequence[str] =
     """
     runs = [run._replace(record=_detect_period(run.record)) for run in saved]
     _check_runs(runs)
+    runs = [_start_at_zero(run) for run in runs]
+    _check_same_setting(runs)
     records = [run.record for run in runs]
     choices = [find_controller(record, controllers) for record in records]
     placeholders = tuple(use_placeholder(choice) for choice in choices)
@@ -111,11 +113,10 @@ def _detect_period(record: Record) -> Record:
 
 
 def _check_runs(saved: Sequence[SavedRun]) -> None:
-    """Raise an InputError unless the window can display the runs side by side."""
+    """Raise an InputError unless the window can display each of the runs."""
     if not 1 <= len(saved) <= MAX_PANES:
         reason = f"{len(saved)} runs, but the window has space for {MAX_PANES}; --frames and --video show all"
         raise InputError(f"{saved[0].folder.parent}: {reason}")
-    first = _describe_run(saved[0].record)
     for run in saved:
         record = run.record
         even_times = np.arange(len(record)) * record.dt
@@ -132,7 +133,30 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
             time = record.time[idle_rows[0]]
             reason = f"expected a working robot at all times, got none at {time:g} s"
             raise InputError(f"{run.folder}: {reason}; --frames and --video show such runs")
-        for name, value in _describe_run(record).items():
+
+
+def _start_at_zero(run: SavedRun) -> SavedRun:
+    """Return a run with times since the start of its record, because a session starts at 0 s."""
+    record = run.record
+    start_time = float(record.time[0])
+    if start_time == 0.0:
+        return run
+    conditions = record.conditions
+    if conditions is not None:
+        conditions = conditions.advance(start_time, len(record.team))
+    joined = tuple(robot._replace(time=robot.time - start_time) for robot in record.joined)
+    record = replace(record, time=record.time - start_time, conditions=conditions, joined=joined)
+    history = run.history
+    if history is not None:
+        history = replace(history, time=history.time - start_time)
+    return run._replace(record=record, history=history)
+
+
+def _check_same_setting(saved: Sequence[SavedRun]) -> None:
+    """Raise an InputError unless the runs can be displayed side by side."""
+    first = _describe_run(saved[0].record)
+    for run in saved:
+        for name, value in _describe_run(run.record).items():
             if value != first[name]:
                 expected = f"expected {first[name]} as in {saved[0].folder}, got {value}"
                 raise InputError(f"{run.folder}: {name}: {expected}; --frames and --video show both")
@@ -332,11 +356,9 @@ def _restore_pane(pane: Pane, saved: SavedRun, history: RunHistory) -> None:
         pane.sensed.add(index * record.dt, numbers, record.obstacle_points[index][is_working])
     if saved.history is None:
         return
-    # The session starts at 0 s, also if the simulation had run before it was recorded.
-    times = saved.history.time - record.time[0]
     values_by_quantity = {"distance": saved.history.mean_distance, "time": saved.history.mean_time}
     for quantity, values in values_by_quantity.items():
         if values is None:
             continue
-        for time, value in zip(times, values, strict=False):
+        for time, value in zip(saved.history.time, values, strict=False):
             pane.curves[quantity].add(float(time), float(value))
