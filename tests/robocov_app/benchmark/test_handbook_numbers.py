@@ -662,8 +662,9 @@ def read_earlier_rows(correction: str, controller: str, track: str) -> list[dict
 
     ``earlier_results.csv`` contains rows of entries of earlier versions: "messages" of those before robots
     shared maps by messages, "stake" of the last ones with ``stake`` = 0.004, "visits" of the last one in
-    which robots of `frontier-median` assumed that those out of range had reached their targets, and "looks"
-    of the last ones in which robots did not look into space among walls.
+    which robots of `frontier-median` assumed that those out of range had reached their targets, "reports" of
+    the last one in which they did not report visits, and "looks" of the last ones in which robots did not
+    look into space among walls.
     """
     with Path(__file__).with_name("earlier_results.csv").open(encoding="utf-8", newline="") as file:
         return [
@@ -740,6 +741,16 @@ def test_changes_of_frontier_median_agree_with_the_entries(track: str) -> None:
     cells = format_changes_on_track("visits", "frontier-median", track)
     row = f"| {suite.format_heading(track)} | {' | '.join(cells)} |"
     assert f"{row}\n" in BENCHMARK_PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("track", ["short-range", "lossy", "plans-medium", "plans-large", "plans-crowd"])
+def test_changes_by_reports_of_visits_agree_with_the_entries(track: str) -> None:
+    cells = format_changes_on_track("reports", "frontier-median", track)
+    row = f"| {suite.format_heading(track)} | {' | '.join(cells)} |"
+    section = BENCHMARK_PAGE.read_text(encoding="utf-8").partition("### Reports of visits before and after")[
+        2
+    ]
+    assert f"{row}\n" in section
 
 
 @pytest.mark.parametrize("controller", ["atlas", "atlas-shared"])
