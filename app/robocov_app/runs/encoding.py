@@ -25,7 +25,7 @@ _PNG_COMPRESSION_LEVEL = 2
 _SECONDS_PER_KEYFRAME = 2
 """Time between two keyframes of a streamed video."""
 _ENCODER_VARIABLE = "IMAGEIO_FFMPEG_EXE"
-"""Environment variable with the path of ffmpeg, which imageio-ffmpeg uses, too."""
+"""Environment variable with the path of ffmpeg, which imageio-ffmpeg also reads."""
 
 
 def encode_png(frame: Frame) -> bytes:
@@ -170,7 +170,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
 
 
 def find_encoder() -> str:
-    """Find the program ffmpeg: that of IMAGEIO_FFMPEG_EXE, of the extra "video", or on the PATH.
+    """Find ffmpeg: first by IMAGEIO_FFMPEG_EXE, then from the extra "video", then on the PATH.
 
     Returns
     -------

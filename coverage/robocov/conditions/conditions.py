@@ -202,7 +202,7 @@ class Conditions:
         return None if remaining.is_ideal else remaining
 
     def advance(self, time: float, robot_count: int) -> Conditions:
-        """Return the conditions for a run that continues another run from a time.
+        """Return the conditions for a run that continues another run from a given time.
 
         Parameters
         ----------

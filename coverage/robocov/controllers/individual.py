@@ -350,13 +350,13 @@ def require_controller(value: Any) -> Controller:
     """
     team_controller = to_team_controller(value)
     is_class = isinstance(team_controller, type)
-    missing = [member for member in _CONTROLLER_MEMBERS if not hasattr(team_controller, member)]
-    if missing and not is_class and hasattr(team_controller, "decide"):
-        raise ParameterError(
-            f"controller: expected an object with {', '.join(_CONTROLLER_MEMBERS)}, "
-            f"got {quote(team_controller)} without {', '.join(missing)}"
-        )
     if is_class or not isinstance(team_controller, Controller):
+        missing = [member for member in _CONTROLLER_MEMBERS if not hasattr(team_controller, member)]
+        if not is_class and "decide" not in missing:
+            raise ParameterError(
+                f"controller: expected the attributes {', '.join(_CONTROLLER_MEMBERS)}, "
+                f"got {quote(team_controller)} without {', '.join(missing)}"
+            )
         raise ParameterError(
             "controller: expected a controller, as in Rapf(), with a method decide or force, "
             f"got {quote(team_controller)}"

@@ -193,8 +193,7 @@ class Environment(Drawable):
         ParameterError
             If the time is not a finite number.
         """
-        if not is_number(time) or not math.isfinite(time):
-            raise ParameterError(f"time: expected a finite number, got {quote(time)}")
+        _check_time(time)
         if not self.has_moving_obstacles:
             return self
         obstacles = []
@@ -206,7 +205,7 @@ class Environment(Drawable):
         return replace(self, obstacles=tuple(obstacles))
 
     def advance(self, time: float) -> Environment:
-        """Return the map for a run that continues another run from a time.
+        """Return the map for a run that continues another run from a given time.
 
         Parameters
         ----------
@@ -216,9 +215,15 @@ class Environment(Drawable):
         Returns
         -------
         Environment
-            The map whose obstacles are at time zero where those of this map are at the given time, and then
-            move in the same way. It is the same object if no obstacle moves.
+            The map with time zero of its moving obstacles shifted to the given time. It is the same object if
+            no obstacle moves.
+
+        Raises
+        ------
+        ParameterError
+            If the time is not a finite number.
         """
+        _check_time(time)
         if time == 0.0 or not self.has_moving_obstacles:
             return self
         obstacles = []
@@ -364,6 +369,12 @@ class Environment(Drawable):
         if not isinstance(name, str) or name not in starts:
             raise StartError(f"map {self.name!r}: {describe_unknown_name('start', str(name), starts)}")
         return Start(name, starts[name], self.free)
+
+
+def _check_time(time: float) -> None:
+    """Check that a time is a finite number."""
+    if not is_number(time) or not math.isfinite(time):
+        raise ParameterError(f"time: expected a finite number, got {quote(time)}")
 
 
 def require_environment(value: object) -> None:

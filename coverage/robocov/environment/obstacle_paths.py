@@ -101,7 +101,7 @@ class ObstaclePath:
         return np.asarray(np.array([x, y]) - points[0])
 
     def advance(self, time: float) -> ObstaclePath:
-        """Return the path from the point that it has reached at a time.
+        """Return the rest of the path from a given time on, as a loop.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class ObstaclePath:
         Returns
         -------
         ObstaclePath
-            A loop along which an obstacle at its position at this time continues in the same way.
+            Path for the obstacle at its position at this time. It is a loop, even for a back-and-forth path.
 
         Examples
         --------

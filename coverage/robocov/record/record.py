@@ -382,7 +382,7 @@ class Record(Drawable):
             "starts_m": self.positions[0].tolist(),
             "seed": self.seed,
             "dt_s": self.dt,
-            "duration_s": float(self.time[-1]),
+            "duration_s": float(self.time[-1] - self.time[0]),
             # The JSON encoder rejects NumPy integers.
             "lattice": None if lattice is None else int(lattice),
         }

@@ -160,7 +160,7 @@ def test_missing_members_of_a_controller_of_a_team_are_named() -> None:
         def __repr__(self) -> str:
             return "Resting()"
 
-    expected = "with name, label, summary, begin, decide, got Resting() without summary, begin"
+    expected = "the attributes name, label, summary, begin, decide, got Resting() without summary, begin"
     with pytest.raises(ParameterError, match=re.escape(expected)):
         require_controller(Resting())
     with pytest.raises(ParameterError, match=r"as in Rapf\(\), with a method decide or force, got <class"):

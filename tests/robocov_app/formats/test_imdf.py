@@ -189,7 +189,7 @@ def test_an_opening_that_is_not_a_line_is_left_out(tmp_path: Path) -> None:
     venue = build_venue()
     venue["opening"].append(build_feature("opening", build_area(14, 11.9, 15, 12.1), level_id=GROUND))
     foreign = read(write_folder(tmp_path / "mill", venue))
-    assert "1 opening that is not a line" in foreign.dropped
+    assert "1 opening with a geometry other than a line" in foreign.dropped
     assert move_to_corner(foreign.free).contains(Point(14.5, 11.94)), "it is not an obstacle"
 
 

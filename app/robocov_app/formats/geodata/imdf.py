@@ -131,7 +131,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             for geometry in _collect_geometries(archive.files[name], k, feature, shapes):
                 role = _choose_role(name, feature, geometry)
                 if role is None:
-                    reason = "that is not a line" if name == "opening" else "without an area"
+                    reason = "with a geometry other than a line" if name == "opening" else "without an area"
                     shapes.count_omission(name, reason)
                     continue
                 roles.append(role)

@@ -107,7 +107,8 @@ def _format_group(group: Mapping[str, Any]) -> str:
     for name, value in group.items():
         if name != "count":
             text = value if isinstance(value, str) else f"{value:g}"
-            differences.append(f"{name.replace('_', ' ')} {text} {UNITS[name]}".rstrip())
+            unit = f" {UNITS[name]}" if UNITS[name] else ""
+            differences.append(f"{name.replace('_', ' ')} {text}{unit}")
     if not differences:
         return f"{group['count']} as the rest"
     return f"{group['count']} with {', '.join(differences)}"

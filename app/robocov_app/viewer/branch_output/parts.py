@@ -191,16 +191,16 @@ def split_branch(branch: SelectedBranch) -> list[BranchPart]:
 
 
 def _advance_map(environment: Environment, start_time: float) -> Environment:
-    """Return the map for a part that starts at a time, s, so that the times of its records start at 0."""
+    """Return the map of a part, with obstacle paths shifted so that time 0 is its start time, s."""
     advanced = environment.advance(start_time)
     if advanced is environment:
         return environment
-    # This removes starts that the obstacles cover at that time, with which the map could not be loaded.
+    # This removes starts that the moved obstacles cover. A map with covered starts cannot be loaded.
     return replace_obstacles(advanced, 0, len(advanced.obstacles), advanced.obstacles)
 
 
 def _build_recorder(setup: PaneSetup, environment: Environment, dt: float) -> Recorder:
-    """Build the recorder of a pane. To the map, failed robots are added as obstacles."""
+    """Build the recorder of a pane. Failed robots are added to the map as obstacles."""
     controller = setup.controller
     for number, position in setup.failed.items():
         name = name_failed_robot(number)
@@ -283,12 +283,12 @@ def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
 def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
     """Return whether a simulation from the start of the record, without user actions, reproduces it."""
     has_known_memory = part.first_step == 0 or not has_memory(setup.controller.build())
-    # Paths of obstacles that start later are shifted, which changes positions by rounding errors.
+    # In later parts, obstacle paths are shifted, which changes positions by rounding errors.
     has_exact_paths = part.first_step == 0 or not setup.environment.has_moving_obstacles
     is_turned = record.steering is not None and bool(record.steering[0].any())
     has_all_robots = setup.numbers == setup.simulated_numbers
-    is_exact = has_known_memory and has_exact_paths and has_all_robots
-    return is_exact and not part.handled and not is_turned
+    is_start_complete = has_known_memory and has_exact_paths and has_all_robots and not is_turned
+    return is_start_complete and not part.handled
 
 
 def _describe_handled(period: HandledTime, first_step: int, dt: float) -> dict[str, Any]:

@@ -136,7 +136,7 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
 
 
 def _start_at_zero(run: SavedRun) -> SavedRun:
-    """Return a run with times since the start of its record, because a session starts at 0 s."""
+    """Return a run whose times are shifted to start at 0 s, as those of a session do."""
     record = run.record
     start_time = float(record.time[0])
     if start_time == 0.0:

@@ -65,17 +65,18 @@ class FrontierMedian(SharedMapController):
     robot stays where it is if the targets of robots in range leave no utility for it; in the paper, it moves
     to a target even then. With unlimited communication, staying saves path length.
 
-    *End of exploration.* A target is not visited again after a robot has been there. Robots out of range do
-    not count, because they may never have arrived. A target is given up when robots in range have headed for
-    it for longer than 3 s plus twice the time that the nearest of them would need at the maximum speed of the
-    robot that plans. Every exploration therefore comes to an end. Targets closer than 0.5 m to each other
-    count as one. Robots do not wait for frontiers that only robots out of range could reach.
+    *End of exploration.* A target is not visited again after a robot has arrived there. Robots out of range
+    are only assumed to arrive, so they end no visit unless a report says so. A target is given up when robots
+    in range have headed for it for longer than 3 s plus twice the time that the nearest of them would need at
+    the maximum speed of the robot that plans. Every exploration therefore comes to an end. Targets closer
+    than 0.5 m to each other count as one. Robots do not wait for frontiers that only robots out of range
+    could reach.
 
-    *Reports of visits.* With a limited communication range, robots make different plans. One of them may not
-    know that another has already visited a target or given it up, and would wait for it to go there. After
-    each plan, a robot therefore reports the targets of all visits that it knows to be over, including those
-    that others have reported to it. While the whole team is in range of each other, it sends no reports,
-    unless a robot has just come into range.
+    *Reports of visits.* With a limited communication range, robots make different plans. A robot might wait
+    for another robot to visit a target that the other one has already visited or given up. After each plan, a
+    robot therefore reports the targets of all visits that it knows to be over, including those that others
+    have reported to it. While all robots are in range of each other, a robot sends a report only if another
+    robot has come into range since its last plan.
     """
 
     name = "frontier-median"

@@ -64,7 +64,7 @@ class Group(NamedTuple):
         return np.asarray(self.message_times == self.time)
 
     def has_new_neighbor(self, previous: Group) -> bool:
-        """Return whether a robot has come into range since a previous plan was made for its group."""
+        """Return whether a robot is in range that was not in range in a previous group."""
         robots_in_range = self.robots[self.is_in_range]
         earlier_robots_in_range = previous.robots[previous.is_in_range]
         return len(np.setdiff1d(robots_in_range, earlier_robots_in_range)) > 0
@@ -120,7 +120,7 @@ class Plan:
     density: Density | None
 
     def add_reported_visits(self, targets: FloatArray) -> Plan:
-        """Return the plan in which visits to targets, (t, 2) m, are over because other robots reported it."""
+        """Return the plan together with reported visits to targets, (t, 2) m, that are over."""
         visits = self.placement.visits
         if visits is None or len(targets) == 0:
             return self
@@ -314,8 +314,8 @@ class SharedMapMemory:
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
     reported_targets: tuple[FloatArray, ...]
-    """Targets, (t, 2) m, of visits that other robots have reported to each robot as over since its last plan.
-    The robot did not know that they are over."""
+    """For each robot, targets, (t, 2) m, of visits that others have reported as over since its last plan.
+    Visits that the robot already knew to be over are left out."""
     next_plan_time: float = -math.inf
     """Time at which all robots plan next, s."""
     returns: FloatArray | None = None
@@ -450,7 +450,9 @@ class SharedMapController(BaseController):
             arrays = tuple(column.tobytes() for column in (*group, reported_targets))
             key = (id(known_map), id(previous_plan), limits, *arrays)
             if key not in plans_by_knowledge:
-                informed_plan = previous_plan and previous_plan.add_reported_visits(reported_targets)
+                informed_plan = previous_plan
+                if informed_plan is not None:
+                    informed_plan = informed_plan.add_reported_visits(reported_targets)
                 plans_by_knowledge[key] = self._make_plan(seen, known_map, informed_plan, group, limits)
             plans.append(plans_by_knowledge[key])
         return tuple(plans)
@@ -535,7 +537,7 @@ def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, rob
 
 
 def _collect_reported_targets(seen: Observations, memory: SharedMapMemory) -> tuple[FloatArray, ...]:
-    """Return the reported targets of each robot, with the new ones in reports that arrive in this step."""
+    """Return the reported targets of each robot, including new ones in the reports of this step."""
     collected = []
     for robot, (plan, earlier_targets) in enumerate(zip(memory.plans, memory.reported_targets, strict=True)):
         targets = extract_reported_targets(seen, robot)
@@ -551,7 +553,7 @@ def _collect_reported_targets(seen: Observations, memory: SharedMapMemory) -> tu
 
 
 def _add_visit_reports(seen: Observations, memory: SharedMapMemory, plans: Sequence[Plan]) -> ScanExchange:
-    """Return the exchange with reports of the visits that are over in the new plans.
+    """Return the exchange with outgoing reports of the visits that are over in the new plans.
 
     While all robots are in range of each other, they make the same plans unless messages are lost or late.
     They then send reports only after a robot has come into range.

@@ -24,7 +24,7 @@ class VisitReport(NamedTuple):
     """Content of a message about the visits that the sender knows to be over."""
 
     targets: FloatArray
-    """(t, 2) m, their targets."""
+    """(t, 2) m, targets of these visits."""
 
 
 class Visits(NamedTuple):
@@ -96,7 +96,9 @@ class Visits(NamedTuple):
         return np.asarray(squared_distances < VISIT_RADIUS_M**2)
 
     def select_new(self, targets: FloatArray) -> FloatArray:
-        """Select the targets of which no visit is known to be over.
+        """Select the targets that differ from those of all visits that are over.
+
+        Targets are compared exactly, not within `VISIT_RADIUS_M`, so that all robots exclude the same ones.
 
         Parameters
         ----------

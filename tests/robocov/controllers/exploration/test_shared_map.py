@@ -307,7 +307,7 @@ def list_informed_robots(simulation: Simulation, time: float) -> list[int]:
 
 
 def test_robots_pass_on_the_visits_that_others_report() -> None:
-    """Robots plan after each second, and send what they know at that time."""
+    """Robots plan once per second, and report what they know then."""
     simulation = build_simulation_with_report(communication_range=2.0)
     informed_robots = [list_informed_robots(simulation, time) for time in (1.5, 2.5, 3.5)]
     assert informed_robots == [[0], [0, 1], [0, 1, 2]]
@@ -319,6 +319,7 @@ def test_a_team_in_range_of_each_other_reports_visits_only_after_a_robot_has_com
     assert list_informed_robots(simulation, 3.5) == [0]
     plans = list(copy.memory.plans)
     group = plans[0].group
+    # In this group of the previous plan, robot 1 was out of range.
     plans[0] = replace(plans[0], group=group._replace(message_times=group.message_times - [0.0, 1.0, 0.0]))
     copy.memory = replace(copy.memory, plans=tuple(plans))
     assert list_informed_robots(copy, 3.5) == [0, 1, 2]

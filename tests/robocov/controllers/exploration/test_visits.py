@@ -88,8 +88,8 @@ def test_targets_close_to_a_reported_one_are_excluded() -> None:
     assert visits.find_excluded(np.array([[1.0, 1.0]])).tolist() == [True]
 
 
-def test_only_targets_of_visits_that_are_over_are_known() -> None:
-    """A target close to a known one is new: otherwise, robots would never exclude the same targets."""
+def test_new_targets_are_found_by_exact_comparison() -> None:
+    """Otherwise, robots with different targets close to each other would never exclude the same ones."""
     visits = start_visit().add_reported(np.array([[3.0, 1.0]]))
     targets = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 1.0 + 0.9 * VISIT_RADIUS_M]])
     assert visits.select_new(targets).tolist() == [targets[0].tolist(), targets[2].tolist()]

@@ -25,8 +25,8 @@ _LARGE_PART_SHARE = 0.1
 _MAX_OFFERED_PARTS = 3
 _MIN_OFFERED_SHARE = 0.01
 """The report offers no part below this fraction of the largest dropped one, such as the inside of letters."""
-_MAX_POSITION_DIGITS = 9
-"""Positions that would need at least this many decimals are not rounded."""
+_MAX_POSITION_DECIMALS = 8
+"""Positions that need more decimals are not rounded."""
 _MIN_PAGE_EDGE_SHARE = 0.2
 """The largest part may be the paper around a plan if it borders on this fraction of the edge of the page."""
 _MIN_PLAN_SHARE = 0.05
@@ -266,12 +266,12 @@ def _measure_length_along(part: Polygon, page: Polygon) -> float:
 
 
 def _choose_position_in(part: Polygon) -> tuple[float, float]:
-    """Return a position in a part, rounded to the centimeter or, in a narrow part, as little as needed."""
+    """Return a position in a part, rounded to centimeters, or more finely in a narrow part."""
     point = shapely.point_on_surface(part)
-    for digits in range(2, _MAX_POSITION_DIGITS):
+    for decimals in range(2, _MAX_POSITION_DECIMALS + 1):
         # Adding 0 turns -0 into 0.
-        x = round(point.x, digits) + 0.0
-        y = round(point.y, digits) + 0.0
+        x = round(point.x, decimals) + 0.0
+        y = round(point.y, decimals) + 0.0
         if shapely.contains_xy(part, x, y):
             return x, y
     return point.x, point.y
