@@ -101,7 +101,7 @@ def test_the_source_of_a_custom_controller_is_saved(tmp_path: Path) -> None:
         ),
         (
             "        raise ValueError('a\\nb\\udcff')\n",
-            "controller 'Mine': ValueError: a b? (mine.py, line 11)",
+            r"controller 'Mine': ValueError: a\nb\udcff (mine.py, line 11)",
         ),
         (
             "        return [float('nan'), 0]\n",
