@@ -259,7 +259,7 @@ def test_the_earlier_of_two_failures_counts() -> None:
     assert stops.tolist() == [random_stops[0], 1e-6]
 
 
-def test_conditions_that_are_advanced_have_the_same_events_earlier() -> None:
+def test_advanced_conditions_have_the_same_events_earlier() -> None:
     conditions = Conditions(
         loss=0.1,
         failure_rate=0.02,

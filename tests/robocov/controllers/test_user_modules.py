@@ -89,7 +89,7 @@ def test_installed_packages_are_left_out(folder: Path, monkeypatch: pytest.Monke
     assert find_own_modules("import installed_c") == {}
 
 
-def test_a_module_of_a_package_may_have_the_name_of_robocov(folder: Path) -> None:
+def test_a_submodule_may_be_named_robocov(folder: Path) -> None:
     (folder / "tree_a" / "robocov.py").touch()
     assert list(find_own_modules("import robocov.errors, tree_a.robocov")) == ["tree_a", "tree_a.robocov"]
 

@@ -243,17 +243,23 @@ def test_export_follows_the_suffix_and_asks_before_replacing(driver: EditorDrive
 
 
 def test_export_asks_before_it_replaces_any_of_its_files(driver: EditorDriver, tmp_path: Path) -> None:
+    def export_to_ros() -> None:
+        driver.press_key("ctrl+e")
+        driver.press_key("ctrl+a")
+        driver.type("untitled.yaml")
+        driver.press_key("return")
+
     image = tmp_path / "untitled.pgm"
     image.write_text("mine")
-    driver.press_key("ctrl+e")
-    driver.press_key("ctrl+a")
-    driver.type("untitled.yaml")
-    driver.press_key("return")
+    export_to_ros()
     assert get_dialog_title(driver) == "Replace the file?"
     assert driver.editor.dialogs.current.text == f"{image} already exists."
     assert image.read_text() == "mine" and not (tmp_path / "untitled.yaml").exists()
     driver.press_key("r")
     assert image.read_bytes().startswith(b"P5") and (tmp_path / "untitled.yaml").exists()
+    export_to_ros()
+    assert get_dialog_title(driver) == "Replace the files?"
+    assert driver.editor.dialogs.current.text == f"{tmp_path / 'untitled.yaml'} and {image} already exist."
 
 
 def test_a_map_is_never_saved_under_another_formats_suffix(driver: EditorDriver, tmp_path: Path) -> None:

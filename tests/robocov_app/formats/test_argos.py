@@ -56,7 +56,7 @@ def test_tilted_bodies_are_left_out(tmp_path: Path) -> None:
     over = WALL.format("b", 1, 1, 0, 0, "0,180").replace("0,180,0,0", "0,180,0")
     foreign = read(tmp_path, tilted + over)
     assert foreign.free.area == pytest.approx(24 - 1)
-    assert foreign.dropped == ("1 box that is tilted",)
+    assert foreign.dropped == ("1 box with a tilt",)
 
 
 GRID = '<position method="grid" center="1,0,0" distances="2,1,0" layout="2,2,1"/>'

@@ -168,7 +168,7 @@ def test_a_number_selects_the_floor_with_this_number_even_if_another_has_it_as_a
     assert "level 1 ('2') of 0, 1 (--level)" in read(folder, level="2").notes
 
 
-def test_of_two_levels_with_the_same_name_the_one_with_units_is_read(tmp_path: Path) -> None:
+def test_a_shared_name_selects_the_level_with_units(tmp_path: Path) -> None:
     venue = build_venue()
     attic = build_feature("level", build_area(0, 0, 30, 20), ordinal=2, short_name={"de": "OG"})
     venue["level"].insert(0, {**attic, "id": "attic"})

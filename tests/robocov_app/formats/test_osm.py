@@ -134,8 +134,8 @@ def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     assert foreign.dropped == (
         "1 element below the ground",
-        "1 way that is not closed",
         "1 way with missing nodes",
+        "1 way without a closed outline",
     )
 
 

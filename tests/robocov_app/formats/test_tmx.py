@@ -179,7 +179,7 @@ def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
     ]
     assert compute_solid_area(foreign, (64, 48)).symmetric_difference(shapely.union_all(expected)).area < 1e-3
     assert foreign.robots == ((8.0, 24.0),)
-    assert foreign.dropped == ("1 object that is a text or a template, or has no area",)
+    assert foreign.dropped == ("1 object with a text or template, or without an area",)
     assert foreign.cell is None
 
 
@@ -201,7 +201,9 @@ def test_objects_next_to_tiles_are_solid_only_if_declared(tmp_path: Path) -> Non
     ground = build_tiles("Ground", ROWS.replace("2", "1"))
     foreign = read(tmp_path, ground, things)
     assert compute_solid_area(foreign).equals(box(3, 2, 4, 3))
-    assert foreign.dropped == ("1 object that is not solid by name or property (--only NAME selects it)",)
+    assert foreign.dropped == (
+        "1 object without a name or property of a solid object (--only NAME selects by name)",
+    )
     assert compute_solid_area(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
     moved = build_objects("walls", square.format(""), more='offsetx="16" offsety="16"')
     assert compute_solid_area(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))

@@ -328,7 +328,9 @@ def test_records_that_start_later_are_rejected_if_obstacles_move(record: Record)
     pillar = replace(HALL.obstacles[0], path=path)
     moving_record = replace(record, environment=replace(HALL, obstacles=(pillar,)))
     assert replay(moving_record).displayed.time == 0.0
-    expected = r"saved/0: expected a start at 0 s, because obstacles move, got 5 s; --frames"
+    expected = (
+        r"saved/0: expected a record from 0 s on, because obstacles move, got one from 5 s on; --frames"
+    )
     with pytest.raises(InputError, match=expected):
         replay(replace(moving_record, time=record.time + 5.0))
 

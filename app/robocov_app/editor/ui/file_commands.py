@@ -303,10 +303,11 @@ class FileCommands:
         existing_files = [str(file) for file in files_to_write if file.exists()]
         if existing_files and not overwrites:
             another_name = ("Another name…", "a", self.ask_export)
-            replace_it = ("Replace it", "r", lambda: self._export(path, overwrites=True))
-            verb = "exists" if len(existing_files) == 1 else "exist"
-            text = f"{' and '.join(existing_files)} already {verb}."
-            self.editor.ask_question("Replace the file?", text, another_name, replace_it, _CANCEL)
+            overwrite = ("Replace", "r", lambda: self._export(path, overwrites=True))
+            is_single = len(existing_files) == 1
+            title = "Replace the file?" if is_single else "Replace the files?"
+            text = f"{' and '.join(existing_files)} already {'exists' if is_single else 'exist'}."
+            self.editor.ask_question(title, text, another_name, overwrite, _CANCEL)
             return None
         report = export_map(self.editor.sketch.build_environment(), path)
         files = ", ".join(map(str, report.files))

@@ -150,7 +150,7 @@ def _place(element: Element, position: FloatArray, angles: FloatArray, shapes: S
     # Rotations by 180 degrees do not tilt boxes and cylinders.
     tilt = np.abs((angles[1:] + 90) % 180 - 90)
     if (tilt > _MAX_TILT_DEG).any():
-        shapes.count_omission(tag, "that is tilted")
+        shapes.count_omission(tag, "with a tilt")
         return
     # Turning a cylinder about z does not change its outline.
     outline_angles = angles if tag == "box" else angles[1:]

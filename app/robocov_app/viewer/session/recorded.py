@@ -126,7 +126,9 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
             file = run.folder / RECORD_FILE
             raise InputError(f"{file}: time: expected times {record.dt:g} s apart")
         if record.time[0] > tolerance and record.environment.has_moving_obstacles:
-            reason = f"expected a start at 0 s, because obstacles move, got {record.time[0]:g} s"
+            reason = (
+                f"expected a record from 0 s on, because obstacles move, got one from {record.time[0]:g} s on"
+            )
             raise InputError(f"{run.folder}: {reason}; --frames and --video show such runs")
         idle_rows = np.flatnonzero(~record.is_working.any(axis=1))
         if len(idle_rows):

@@ -36,7 +36,7 @@ def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeom
         shapes.count_omission(element.kind, "without an area")
         return None
     if not all((ring[0] == ring[-1]).all() for ring in rings):
-        shapes.count_omission(element.kind, "that is not closed")
+        shapes.count_omission(element.kind, "without a closed outline")
         return None
     return SourceGeometry("polygon", tuple(rings), element.labels, element.location, rule="evenodd")
 

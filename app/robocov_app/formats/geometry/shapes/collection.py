@@ -267,7 +267,10 @@ class Shapes:
         return points[:, :2]
 
     def count_omission(self, kind: str, reason: str = "", count: int = 1) -> None:
-        """Count shapes that are left out of the map, for the report."""
+        """Count shapes that are left out of the map, for the report.
+
+        The reason follows the noun, and must fit one shape as well as several: "without an area".
+        """
         self.omissions.counts[kind, reason] += count
 
     @property

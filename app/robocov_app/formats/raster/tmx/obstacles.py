@@ -184,7 +184,7 @@ class ObstacleReader:
             ):
                 self._add_shape(element, shape, labels)
             else:
-                reason = "that is not solid by name or property (--only NAME selects it)"
+                reason = "without a name or property of a solid object (--only NAME selects by name)"
                 self._shapes.count_omission("object", reason)
 
     def _is_solid(
@@ -211,4 +211,4 @@ class ObstacleReader:
         else:
             is_polygon = shape.kind == "polygon"
             if not is_polygon or not shapes.add_outline([points], labels, location=location, kind=""):
-                shapes.count_omission("object", "that is a text or a template, or has no area")
+                shapes.count_omission("object", "with a text or template, or without an area")
