@@ -95,11 +95,13 @@ def explain_fault(context: str, error: BaseException, ending: str = "") -> Roboc
 
 
 def _describe_exception(error: BaseException) -> str:
-    """Return the class and the message of an exception, on one line."""
+    """Return the class name and the message of an exception on one line."""
     name = type(error).__name__
     try:
         message = to_one_line(error)
-    except Exception:  # The class of the exception may be the user's own, and fail to build a message.
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # The __str__ of an exception class of the user may raise anything.
         return f"{name} (no message)"
     return f"{name}: {message}" if message else name
 
@@ -257,7 +259,7 @@ def find_own_modules(text: str) -> dict[str, ModuleText]:
 
 
 def is_own_module(name: str) -> bool:
-    """Return whether an import would load a module outside Python, robocov and all installed packages.
+    """Return whether a module is neither installed nor a part of Python or robocov.
 
     Unlike `find_own_modules`, this includes modules without source code, such as extension modules.
 
@@ -338,8 +340,9 @@ def _list_imports(text: str, package: str) -> Iterator[str]:
 
 def _is_own(name: str, spec: ModuleSpec) -> bool:
     """Return whether the module with a full name is neither installed nor a part of Python or robocov."""
-    is_built_in = spec.origin is not None and not spec.has_location
-    if is_built_in or name.partition(".")[0] in ("robocov", "robocov_app"):
+    top_name = name.partition(".")[0]
+    # A file with the name of a built-in module is never imported.
+    if top_name in sys.builtin_module_names or top_name in ("robocov", "robocov_app"):
         return False
     folders = spec.submodule_search_locations or ()
     path = Path(os.path.realpath(spec.origin or next(iter(folders), "")))

@@ -101,7 +101,7 @@ class ObstaclePath:
         return np.asarray(np.array([x, y]) - points[0])
 
     def advance(self, time: float) -> ObstaclePath:
-        """Return the rest of the path from a given time on, as a loop.
+        """Return the path that continues this one from a given time, as a loop.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class ObstaclePath:
         Returns
         -------
         ObstaclePath
-            Path for the obstacle at its position at this time. It is a loop, even for a back-and-forth path.
+            Path that starts at the obstacle's position at this time. It is a loop even if this path is not.
 
         Examples
         --------

@@ -10,7 +10,13 @@ from pathlib import Path
 import pytest
 
 from robocov.controllers import load_controller_class
-from robocov.controllers.user_modules import ControllerSource, ModuleText, find_own_modules, provide_modules
+from robocov.controllers.user_modules import (
+    ControllerSource,
+    ModuleText,
+    find_own_modules,
+    is_own_module,
+    provide_modules,
+)
 
 CONTROLLER = """
 from dataclasses import dataclass
@@ -92,6 +98,12 @@ def test_installed_packages_are_left_out(folder: Path, monkeypatch: pytest.Monke
 def test_a_submodule_may_be_named_robocov(folder: Path) -> None:
     (folder / "tree_a" / "robocov.py").touch()
     assert list(find_own_modules("import robocov.errors, tree_a.robocov")) == ["tree_a", "tree_a.robocov"]
+
+
+def test_a_file_with_the_name_of_a_built_in_module_is_not_stored(folder: Path) -> None:
+    (folder / "time.py").touch()
+    assert find_own_modules("import time") == {}
+    assert not is_own_module("time")
 
 
 def test_modules_are_imported_from_their_texts_and_leave_no_trace(

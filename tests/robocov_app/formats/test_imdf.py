@@ -158,7 +158,7 @@ def test_a_missing_level_is_reported(tmp_path: Path) -> None:
         read(write_folder(tmp_path / "house", venue), level="DG")
 
 
-def test_a_number_selects_the_floor_with_this_number_even_if_another_has_it_as_a_name(tmp_path: Path) -> None:
+def test_a_level_number_takes_precedence_over_the_name_of_another_level(tmp_path: Path) -> None:
     venue = build_venue()
     for level, name in zip(venue["level"], ("1", "2"), strict=True):
         level["properties"]["short_name"] = {"en": name}

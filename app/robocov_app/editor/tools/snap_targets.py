@@ -38,7 +38,7 @@ class _TargetCollector:
         if isinstance(shape, PointsStart):
             self.centers += [point for k, point in enumerate(shape.positions) if k not in dragged]
         elif not dragged:
-            # Dragging a vertex of a circle, disc or wall changes its outline, which is then no target.
+            # A circle, disc or wall whose vertex is dragged changes with it, and offers no targets.
             self._add_outline(sketch, owner)
         for ring in sketch.list_rings(owner):
             self._add_ring(ring, self.dragged[owner, ring.number])

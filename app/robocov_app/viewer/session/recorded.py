@@ -138,7 +138,7 @@ def _check_runs(saved: Sequence[SavedRun]) -> None:
 
 
 def _start_at_zero(run: SavedRun) -> SavedRun:
-    """Return a run whose times are shifted to start at 0 s, as those of a session do."""
+    """Return a run whose times are shifted so that it starts at 0 s, like a session."""
     record = run.record
     start_time = float(record.time[0])
     if start_time == 0.0:

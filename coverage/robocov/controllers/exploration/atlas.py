@@ -584,7 +584,7 @@ class Atlas(BaseController):
 
 
 def _compute_path_factor(state: PlannerState, doubling_length: float) -> float:
-    """Return the factor by which the path to viewpoints has raised what must be gained from another one.
+    """Return the factor by which the required gain of a viewpoint has grown with the path to viewpoints.
 
     It is 1 at first, and doubles with each `doubling_length`, in diameters of the region.
     """
