@@ -753,6 +753,39 @@ def test_changes_by_reports_of_visits_agree_with_the_entries(track: str) -> None
     assert f"{row}\n" in section
 
 
+def read_gaps_by_reports(track: str) -> dict[str, tuple[float, float]]:
+    """Return the gaps of `frontier-median` on each map of a track, without and with reports of visits."""
+    rows_before, rows_after, _ = select_comparable_rows("reports", "frontier-median", track)
+    gaps = {}
+    for before, after in zip(rows_before, rows_after, strict=True):
+        gaps[after["map"]] = (round(float(before["gap"]), 5), round(after["gap"], 5))
+    return gaps
+
+
+def test_gaps_on_single_maps_with_reports_of_visits_agree_with_the_entries() -> None:
+    text = read_text(BENCHMARK_PAGE)
+    gaps = read_gaps_by_reports("plans-medium")
+    smaller = [name for name, (before, after) in gaps.items() if after < before]
+    larger = [name for name, (before, after) in gaps.items() if after > before]
+    assert smaller == ["office-floors-7002", "wards-7002", "museums-7002"]
+    assert larger == ["depots-7002", "schools-7002"]
+    before, after = np.array([gaps[name] for name in smaller]).T
+    assert (
+        f"on {smaller[0]}, {smaller[1]} and {smaller[2]} from {before[0]:.0%}, {before[1]:.0%} and "
+        f"{before[2]:.0%} to {after[0]:.0%}, {after[1]:.0%} and {after[2]:.0%}."
+    ) in text
+    before, after = np.array([gaps[name] for name in larger]).T
+    assert (
+        f"They grow on {larger[0]} and {larger[1]}, from {before[0]:.0%} to {after[0]:.0%} and from "
+        f"{before[1]:.0%} to {after[1]:.0%}."
+    ) in text
+    limited = [
+        gaps for track in ("plans-large", "plans-crowd") for gaps in read_gaps_by_reports(track).values()
+    ]
+    larger_count = sum(after > before for before, after in limited)
+    assert f"{larger_count} of {len(limited)} gaps are larger with reports" in text
+
+
 @pytest.mark.parametrize("controller", ["atlas", "atlas-shared"])
 @pytest.mark.parametrize("track", [*suite.RANKED_TRACKS["core"], *PLAN_TRACKS])
 def test_changes_by_looks_among_walls_agree_with_the_entries(track: str, controller: str) -> None:
